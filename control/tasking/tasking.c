@@ -98,7 +98,8 @@ bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *t, const bst_tasking_conf
     *t = (bst_tasking){.config = *config,
                        .tick_rate_hz = tick_rate_hz,
                        .sensor_count = member_count,
-                       .object_count = bst_knowledge_object_count(members[0].knowledge)};
+                       .object_count = bst_knowledge_object_count(members[0].knowledge),
+                       .places_s = NAN};
     (void)lay_out(t);
     char what[64];
     snprintf(what, sizeof what, "the tasks of %d objects", t->object_count);
@@ -200,72 +201,86 @@ static bst_task_end ending(const bst_tasking *t, const bst_tasking_sensor *s, do
     return now_s > s->arrival_s + t->config.find_timeout_s ? BST_TASK_NOT_FOUND : BST_TASK_NONE;
 }
 
-/* True if a choice comes before another: the larger value, then catalogue order. */
-static bool comes_before(const bst_tasking_choice *a, const bst_tasking_choice *b) {
-    return a->value != b->value ? a->value > b->value : a->object < b->object;
-}
-
-/* Moves the choice at a place of a heap down until none below comes before it. */
-static void sift_down(bst_tasking_choice *heap, int count, int place) {
-    const bst_tasking_choice moved = heap[place];
-    for (int below = 2 * place + 1; below < count; below = 2 * place + 1) {
-        below += below + 1 < count && comes_before(&heap[below + 1], &heap[below]);
-        if (!comes_before(&heap[below], &moved)) {
-            break;
-        }
-        heap[place] = heap[below];
-        place = below;
-    }
-    heap[place] = moved;
-}
-
-/* Takes the first choice from a heap. */
-static bst_tasking_choice take_first(bst_tasking_choice *heap, int *count) {
-    const bst_tasking_choice first = heap[0];
-    heap[0] = heap[--*count];
-    sift_down(heap, *count, 0);
-    return first;
-}
-
 /* Tabulated position of an object, geocentric. */
 static bst_vec3 place_of(const bst_tasking *t, int object) {
     return (bst_vec3){t->place_m[0][object], t->place_m[1][object], t->place_m[2][object]};
 }
 
-/* Lists the targets that are due, unassigned, and outside of the keep-out zones by the table of
- * positions, as a heap. */
+/* Urgency of a target: below 1 it is not due. */
+static double urgency_of(const bst_tasking *t, int object, double now_s) {
+    const bst_tasking_line *line = line_of(t, object);
+    /* a target never observed is due from the start, with growing urgency */
+    double since = t->seen_s[object] < 0.0 ? now_s + line->revisit_s : now_s - t->seen_s[object];
+    return since / line->revisit_s;
+}
+
+/* Value of a target after a slew. */
+static double value_of(const bst_tasking *t, int sensor, int object, double urgency,
+                       double slew_s) {
+    const bst_tasking_line *line = line_of(t, object);
+    double work_s =
+        slew_s + t->config.settle_s + (double)line->frames * t->sensors[sensor].period_s;
+    return line->priority * fmin(urgency, URGENCY_MOST) / work_s;
+}
+
+/* Reads the table of positions, if that of this time is not the one in `place_m`. */
+static void read_places(bst_tasking *t, const bst_knowledge *knowledge, double now_s) {
+    if (bst_knowledge_places_time(now_s) != t->places_s) {
+        t->places_s =
+            bst_knowledge_places(knowledge, now_s, t->place_m[0], t->place_m[1], t->place_m[2]);
+    }
+}
+
+/* Lists the targets that are due and unassigned as a heap, with the value that each has without a
+ * slew: the largest that it can have. */
 static int list_choices(bst_tasking *t, int sensor, double now_s) {
-    const bst_tasking_sensor *s = &t->sensors[sensor];
-    const bst_tasking_config *c = &t->config;
     int count = 0;
-    (void)bst_knowledge_places(s->knowledge, now_s, t->place_m[0], t->place_m[1], t->place_m[2]);
+    read_places(t, t->sensors[sensor].knowledge, now_s);
     for (int i = 0; i < t->object_count; i++) {
         if (t->line[i] < 0 || t->holder[i] >= 0 || *not_before(t, sensor, i) > (float)now_s) {
             continue;
         }
-        const bst_tasking_line *line = line_of(t, i);
-        /* a target never observed is due from the start, with growing urgency */
-        double since = t->seen_s[i] < 0.0 ? now_s + line->revisit_s : now_s - t->seen_s[i];
-        if (since < line->revisit_s) {
-            continue;
+        double urgency = urgency_of(t, i, now_s);
+        if (!(urgency < 1.0)) {
+            t->choices[count++] = (bst_tasking_choice){
+                .object = i, .urgency = urgency, .value = value_of(t, sensor, i, urgency, 0.0)};
         }
-        bst_vec3 place = place_of(t, i), direction = s->direction;
-        if (!isnan(place.x) && (bst_vec3_norm(place) == 0.0 ||
-                                bst_tasking_glance(s, place, &direction) != BST_WHY_NOT)) {
-            continue;
-        }
-        double turn = s->pointed ? bst_vec3_angle(s->direction, direction) : 0.0;
-        double slew_s = turn / (c->slew_rate_deg_per_s * BST_DEG_RAD);
-        double work_s = slew_s + c->settle_s + (double)line->frames * s->period_s;
-        t->choices[count++] = (bst_tasking_choice){
-            .object = i,
-            .value = line->priority * fmin(since / line->revisit_s, URGENCY_MOST) / work_s,
-            .slew_s = slew_s};
     }
-    for (int i = count / 2 - 1; i >= 0; i--) {
-        sift_down(t->choices, count, i);
-    }
+    bst_tasking_heap_make(t->choices, count);
     return count;
+}
+
+/* Sets the slew to a target and its value with it. False: it is in a keep-out zone by the table of
+ * positions, or without an orbit. */
+static bool place_choice(const bst_tasking *t, int sensor, bst_tasking_choice *choice) {
+    const bst_tasking_sensor *s = &t->sensors[sensor];
+    bst_vec3 place = place_of(t, choice->object), direction = s->direction;
+    if (!isnan(place.x) &&
+        (bst_vec3_norm(place) == 0.0 || bst_tasking_glance(s, place, &direction) != BST_WHY_NOT)) {
+        return false;
+    }
+    double turn = s->pointed ? bst_vec3_angle(s->direction, direction) : 0.0;
+    choice->slew_s = turn / (t->config.slew_rate_deg_per_s * BST_DEG_RAD);
+    choice->value = value_of(t, sensor, choice->object, choice->urgency, choice->slew_s);
+    choice->placed = true;
+    return true;
+}
+
+/* Takes the choice of the largest value, after its slew, from the heap; false: there is none. */
+static bool next_choice(const bst_tasking *t, int sensor, int *count, bst_tasking_choice *out) {
+    bst_tasking_choice *heap = t->choices;
+    while (*count > 0 && !heap[0].placed) {
+        if (place_choice(t, sensor, &heap[0])) {
+            bst_tasking_heap_lower(heap, *count);
+        } else {
+            (void)bst_tasking_heap_take(heap, count);
+        }
+    }
+    if (*count == 0) {
+        return false;
+    }
+    *out = bst_tasking_heap_take(heap, count);
+    return true;
 }
 
 /* Visibility of an object from arrival to the last wanted frame: geometry at arrival, the smaller
@@ -316,8 +331,8 @@ static bst_status choose_target(bst_ctx *ctx, bst_tasking *t, int sensor, double
                                 bst_tasking_choice *chosen, bst_tasking_visibility *seen) {
     int count = list_choices(t, sensor, now_s), tries = 0;
     chosen->object = -1;
-    while (count > 0 && tries < TRIES) {
-        const bst_tasking_choice next = take_first(t->choices, &count);
+    bst_tasking_choice next;
+    while (tries < TRIES && next_choice(t, sensor, &count, &next)) {
         const bst_vec3 place = place_of(t, next.object);
         /* the shadow, which costs more than the zones, only of those that are tried */
         if (!isnan(place.x) && bst_tasking_in_shadow(&t->sensors[sensor], place)) {

@@ -82,7 +82,8 @@ typedef struct bst_tasking_sensor {
 
 typedef struct bst_tasking_choice {
     int object;
-    double value, slew_s;
+    bool placed; /* its value includes the slew; else it is an upper limit */
+    double urgency, value, slew_s;
 } bst_tasking_choice;
 
 typedef struct bst_tasking {
@@ -96,6 +97,7 @@ typedef struct bst_tasking {
     double *seen_s;     /* [object] time of the latest sighting; below 0: none */
     int *holder;        /* [object] index of the sensor whose task it is, -1: none */
     float *not_before;  /* [sensor][object] s: earliest time of the next attempt */
+    double places_s;    /* time of place_m; NAN: none */
     double *place_m[3]; /* [object] */
     bst_tasking_choice *choices;
     double next_report_s;

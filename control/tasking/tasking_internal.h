@@ -14,6 +14,13 @@ bool bst_tasking_in_shadow(const bst_tasking_sensor *sensor, bst_vec3 place_m);
  * where it does not decide, and without such a message, bst_tasking_look does. */
 bst_status bst_tasking_survey_look(bst_ctx *ctx, const bst_tasking *tasking, int sensor, int object,
                                    double seconds, bst_tasking_why *why) BST_MUST_CHECK;
+/* tasking_heap.c. Makes a heap of choices: the first is that of the largest value, among equal ones
+ * that of the object that comes first in the catalogue. */
+void bst_tasking_heap_make(bst_tasking_choice *heap, int count);
+/* Restores the order after the first choice's value was lowered. */
+void bst_tasking_heap_lower(bst_tasking_choice *heap, int count);
+/* Takes the first choice of at least one. */
+bst_tasking_choice bst_tasking_heap_take(bst_tasking_choice *heap, int *count);
 /* Sets the sensor's pixel noise and noise-equivalent area. */
 void bst_tasking_noise(bst_tasking_sensor *sensor);
 

@@ -252,8 +252,8 @@ bst_status bst_tasking_survey_look(bst_ctx *ctx, const bst_tasking *t, int senso
 bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,
                               bst_tasking_report *out) {
     *out = (bst_tasking_report){.targets = 0};
-    (void)bst_knowledge_places(t->sensors[0].knowledge, seconds, t->place_m[0], t->place_m[1],
-                               t->place_m[2]);
+    t->places_s = bst_knowledge_places(t->sensors[0].knowledge, seconds, t->place_m[0],
+                                       t->place_m[1], t->place_m[2]);
     for (int i = 0; i < t->object_count; i++) {
         if (t->line[i] < 0) {
             continue;

@@ -121,6 +121,8 @@ bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee
  * orbit. */
 double bst_knowledge_places(const bst_knowledge *knowledge, double seconds, double *x_m,
                             double *y_m, double *z_m);
+/* The time of the positions that bst_knowledge_places returns: those of one time are the same. */
+double bst_knowledge_places_time(double seconds);
 /* Objects that may be in a cone of apparent directions at `seconds`: all that are, and few others.
  *
  * Returned:  *count  in `indices`, ascending; room for all objects is needed */

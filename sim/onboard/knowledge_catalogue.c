@@ -54,6 +54,10 @@ double bst_knowledge_places(const bst_knowledge *k, double seconds, double *x_m,
     return t;
 }
 
+double bst_knowledge_places_time(double seconds) {
+    return bst_ephemeris_places_time(seconds);
+}
+
 bst_status bst_knowledge_near(bst_ctx *ctx, bst_knowledge_view *view, double seconds, bst_vec3 axis,
                               double half_angle_rad, int *indices, int *count) {
     double t;

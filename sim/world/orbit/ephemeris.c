@@ -427,9 +427,17 @@ int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_con
     return count;
 }
 
+static int64_t table_index(double seconds) {
+    return llround(fmax(fmin(seconds, 1e9), -1e9) / TABLE_STEP_S);
+}
+
+double bst_ephemeris_places_time(double seconds) {
+    return (double)table_index(seconds) * TABLE_STEP_S;
+}
+
 double bst_ephemeris_places(bst_ephemeris *e, double seconds, double *x_m, double *y_m,
                             double *z_m) {
-    int64_t index = llround(fmax(fmin(seconds, 1e9), -1e9) / TABLE_STEP_S);
+    int64_t index = table_index(seconds);
     size_t bytes = (size_t)e->object_count * sizeof *x_m;
     pthread_mutex_lock(&e->lock);
     const table *t = table_at(e, index);
