@@ -87,7 +87,6 @@ static size_t lay_out(bst_tasking *t) {
     BST_ARENA_TAKE(&t->arena, t->holder, n);
     BST_ARENA_TAKE(&t->arena, t->not_before, n * sensors);
     BST_ARENA_TAKE(&t->arena, t->place_m[0], 3 * n);
-    BST_ARENA_TAKE(&t->arena, t->choices, n);
     return n;
 }
 
@@ -155,7 +154,7 @@ static bst_status archive_sensor(bst_tasking *t, int sensor, bst_archive *archiv
     return BST_OK;
 }
 
-/* `place_m` and `choices` are the work space of one plan; `line` follows from the list. */
+/* `place_m` is the work space of a plan; `line` follows from the list. */
 bst_status bst_tasking_archive(bst_tasking *t, bst_archive *archive) {
     size_t objects = (size_t)t->object_count;
     bst_archive_bytes(archive, t->seen_s, objects * sizeof *t->seen_s);
@@ -201,11 +200,6 @@ static bst_task_end ending(const bst_tasking *t, const bst_tasking_sensor *s, do
     return now_s > s->arrival_s + t->config.find_timeout_s ? BST_TASK_NOT_FOUND : BST_TASK_NONE;
 }
 
-/* Tabulated position of an object, geocentric. */
-static bst_vec3 place_of(const bst_tasking *t, int object) {
-    return (bst_vec3){t->place_m[0][object], t->place_m[1][object], t->place_m[2][object]};
-}
-
 /* Urgency of a target: below 1 it is not due. */
 static double urgency_of(const bst_tasking *t, int object, double now_s) {
     const bst_tasking_line *line = line_of(t, object);
@@ -231,56 +225,67 @@ static void read_places(bst_tasking *t, const bst_knowledge *knowledge, double n
     }
 }
 
-/* Lists the targets that are due and unassigned as a heap, with the value that each has without a
- * slew: the largest that it can have. */
-static int list_choices(bst_tasking *t, int sensor, double now_s) {
-    int count = 0;
-    read_places(t, t->sensors[sensor].knowledge, now_s);
-    for (int i = 0; i < t->object_count; i++) {
-        if (t->line[i] < 0 || t->holder[i] >= 0 || *not_before(t, sensor, i) > (float)now_s) {
-            continue;
-        }
-        double urgency = urgency_of(t, i, now_s);
-        if (!(urgency < 1.0)) {
-            t->choices[count++] = (bst_tasking_choice){
-                .object = i, .urgency = urgency, .value = value_of(t, sensor, i, urgency, 0.0)};
-        }
-    }
-    bst_tasking_heap_make(t->choices, count);
-    return count;
-}
-
-/* Sets the slew to a target and its value with it. False: it is in a keep-out zone by the table of
- * positions, or without an orbit. */
-static bool place_choice(const bst_tasking *t, int sensor, bst_tasking_choice *choice) {
+/* Sets the slew to a target and its value with it. False: by the table of positions it is in a
+ * keep-out zone, in the shadow, or without an orbit. */
+static bool place_choice(const bst_tasking *t, int sensor, double urgency,
+                         bst_tasking_choice *choice) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
-    bst_vec3 place = place_of(t, choice->object), direction = s->direction;
+    const int i = choice->object;
+    bst_vec3 place = {t->place_m[0][i], t->place_m[1][i], t->place_m[2][i]};
+    bst_vec3 direction = s->direction;
     if (!isnan(place.x) &&
         (bst_vec3_norm(place) == 0.0 || bst_tasking_glance(s, place, &direction) != BST_WHY_NOT)) {
         return false;
     }
     double turn = s->pointed ? bst_vec3_angle(s->direction, direction) : 0.0;
     choice->slew_s = turn / (t->config.slew_rate_deg_per_s * BST_DEG_RAD);
-    choice->value = value_of(t, sensor, choice->object, choice->urgency, choice->slew_s);
-    choice->placed = true;
+    choice->value = value_of(t, sensor, i, urgency, choice->slew_s);
     return true;
 }
 
-/* Takes the choice of the largest value, after its slew, from the heap; false: there is none. */
-static bool next_choice(const bst_tasking *t, int sensor, int *count, bst_tasking_choice *out) {
-    bst_tasking_choice *heap = t->choices;
-    while (*count > 0 && !heap[0].placed) {
-        if (place_choice(t, sensor, &heap[0])) {
-            bst_tasking_heap_lower(heap, *count);
-        } else {
-            (void)bst_tasking_heap_take(heap, count);
+/* True if a choice comes before another: the larger value, then catalogue order. */
+static bool comes_before(const bst_tasking_choice *a, const bst_tasking_choice *b) {
+    return a->value != b->value ? a->value > b->value : a->object < b->object;
+}
+
+/* The first choices of all, in their order. */
+enum { MOST_CHOICES = 16 };
+typedef struct choice_list {
+    int count;
+    bst_tasking_choice items[MOST_CHOICES];
+} choice_list;
+
+static bool has_room(const choice_list *list, const bst_tasking_choice *choice) {
+    return list->count < MOST_CHOICES || comes_before(choice, &list->items[MOST_CHOICES - 1]);
+}
+
+static void insert_choice(choice_list *list, const bst_tasking_choice *choice) {
+    int at = list->count < MOST_CHOICES ? list->count++ : MOST_CHOICES - 1;
+    for (; at > 0 && comes_before(choice, &list->items[at - 1]); at--) {
+        list->items[at] = list->items[at - 1];
+    }
+    list->items[at] = *choice;
+}
+
+/* Lists the first targets after `last` (NULL: of all) that are due, unassigned, and visible by a
+ * quick check. That is omitted where a target without a slew, the largest value that it can have,
+ * would come after the list. */
+static void list_choices(const bst_tasking *t, int sensor, double now_s,
+                         const bst_tasking_choice *last, choice_list *list) {
+    const float *from_s = &t->not_before[(size_t)sensor * (size_t)t->object_count];
+    list->count = 0;
+    for (int i = 0; i < t->object_count; i++) {
+        if (t->line[i] < 0 || t->holder[i] >= 0 || from_s[i] > (float)now_s) {
+            continue;
+        }
+        double urgency = urgency_of(t, i, now_s);
+        bst_tasking_choice choice = {.object = i, .value = value_of(t, sensor, i, urgency, 0.0)};
+        if (!(urgency < 1.0) && has_room(list, &choice) &&
+            place_choice(t, sensor, urgency, &choice) && has_room(list, &choice) &&
+            (!last || comes_before(last, &choice))) {
+            insert_choice(list, &choice);
         }
     }
-    if (*count == 0) {
-        return false;
-    }
-    *out = bst_tasking_heap_take(heap, count);
-    return true;
 }
 
 /* Visibility of an object from arrival to the last wanted frame: geometry at arrival, the smaller
@@ -326,28 +331,33 @@ static void assign_task(bst_tasking *t, int sensor, int64_t tick, bst_task_end b
     }
 }
 
+/* Time after which a target that cannot be seen is tried again. */
+static double retry_after_s(const bst_tasking *t, bst_tasking_why why) {
+    return why == BST_WHY_FAINT    ? t->config.retry_s
+           : why == BST_WHY_ITSELF ? INFINITY
+                                   : HIDDEN_RETRY_S;
+}
+
 /* Best target that the sensor can see; object -1: none. */
 static bst_status choose_target(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s,
                                 bst_tasking_choice *chosen, bst_tasking_visibility *seen) {
-    int count = list_choices(t, sensor, now_s), tries = 0;
+    choice_list list;
+    bst_tasking_choice last;
     chosen->object = -1;
-    bst_tasking_choice next;
-    while (tries < TRIES && next_choice(t, sensor, &count, &next)) {
-        const bst_vec3 place = place_of(t, next.object);
-        /* the shadow, which costs more than the zones, only of those that are tried */
-        if (!isnan(place.x) && bst_tasking_in_shadow(&t->sensors[sensor], place)) {
-            continue;
-        }
-        tries++;
-        BST_TRY(sees(ctx, t, sensor, &next, now_s, seen));
+    read_places(t, t->sensors[sensor].knowledge, now_s);
+    list_choices(t, sensor, now_s, NULL, &list);
+    for (int tries = 0, k = 0; tries < TRIES && k < list.count; tries++) {
+        BST_TRY(sees(ctx, t, sensor, &list.items[k], now_s, seen));
         if (seen->why == BST_WHY_NOT) {
-            *chosen = next;
+            *chosen = list.items[k];
             return BST_OK;
         }
-        double wait_s = seen->why == BST_WHY_FAINT    ? t->config.retry_s
-                        : seen->why == BST_WHY_ITSELF ? INFINITY
-                                                      : HIDDEN_RETRY_S;
-        *not_before(t, sensor, next.object) = (float)(now_s + wait_s);
+        last = list.items[k++];
+        *not_before(t, sensor, last.object) = (float)(now_s + retry_after_s(t, seen->why));
+        if (k == MOST_CHOICES) {
+            list_choices(t, sensor, now_s, &last, &list);
+            k = 0;
+        }
     }
     return BST_OK;
 }

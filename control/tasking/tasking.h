@@ -82,8 +82,7 @@ typedef struct bst_tasking_sensor {
 
 typedef struct bst_tasking_choice {
     int object;
-    bool placed; /* its value includes the slew; else it is an upper limit */
-    double urgency, value, slew_s;
+    double value, slew_s;
 } bst_tasking_choice;
 
 typedef struct bst_tasking {
@@ -99,7 +98,6 @@ typedef struct bst_tasking {
     float *not_before;  /* [sensor][object] s: earliest time of the next attempt */
     double places_s;    /* time of place_m; NAN: none */
     double *place_m[3]; /* [object] */
-    bst_tasking_choice *choices;
     double next_report_s;
 } bst_tasking;
 

@@ -69,13 +69,15 @@ static bst_tasking_why zone_reason(const bst_keep_out_zone *zones, const double 
 
 bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *s, bst_vec3 place_m,
                                    bst_vec3 *direction) {
-    *direction = bst_vec3_unit(bst_vec3_sub(place_m, s->nav.position_gcrf_m));
-    return zone_reason(s->zones, s->zone_cosines, s->zone_count, *direction);
-}
-
-bool bst_tasking_in_shadow(const bst_tasking_sensor *s, bst_vec3 place_m) {
-    bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
-    return !(bst_astro_sun_fraction(place_m, sun_m, BST_EARTH_POLE_J2000) > 0.5);
+    bst_vec3 line = bst_vec3_sub(place_m, s->nav.position_gcrf_m);
+    *direction = bst_vec3_unit(line);
+    bst_tasking_why why = zone_reason(s->zones, s->zone_cosines, s->zone_count, *direction);
+    if (why == BST_WHY_NOT) {
+        bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
+        why = bst_astro_sun_fraction(place_m, sun_m, BST_EARTH_POLE_J2000) > 0.5 ? BST_WHY_NOT
+                                                                                 : BST_WHY_SHADOW;
+    }
+    return why;
 }
 
 /* Context of the callback of bst_pointing_feasibility_at. */

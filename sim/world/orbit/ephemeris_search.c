@@ -1,8 +1,6 @@
 #include "sim/world/orbit/ephemeris_search.h"
 
 #include <math.h>
-#include <stdint.h>
-#include <string.h>
 
 #include "sim/astro/bodies.h"
 #include "sim/core/simd.h"
@@ -37,35 +35,44 @@ void bst_ephemeris_rows_set(const bst_ephemeris_rows *rows, int object, const do
     rows->x_m[object] = place_m[0];
     rows->y_m[object] = place_m[1];
     rows->z_m[object] = place_m[2];
-    rows->speed_mps[object] = (float)speed_mps;
+    const bool unknown = isnan(place_m[0]);
+    rows->speed_mps[object] = unknown ? INFINITY : (float)speed_mps; /* it may be anywhere */
     for (int i = 0; i < 3; i++) {
-        rows->near_m[i][object] = (float)place_m[i];
+        rows->near_m[i][object] = unknown ? 0.0f : (float)place_m[i];
         rows->velocity_mps[i][object] = velocity_mps ? (float)velocity_mps[i] : NAN;
     }
 }
 
-/* A cone in single precision, apex and axis by axis. */
+/* A cone in single precision. */
 typedef struct cone_pass {
     float apex_m[3], axis[3], sin_half, cos_half, span_s, sure_m, least_mps;
 } cone_pass;
 
-/* Marks the objects whose distance from the surface of the cone is at most their uncertainty, or
- * unknown. Behind the apex the distance is an upper limit. */
-BST_CLONES_256 static void mark(const bst_ephemeris_rows *rows, int begin, int n,
-                                const cone_pass *c, int32_t *inside) {
+/* Distance of n objects from the surface of the cone, minus their uncertainty. Behind the apex it
+ * is an upper limit. */
+BST_CLONES_256 static void distances(const bst_ephemeris_rows *rows, int begin, int n,
+                                     const cone_pass *cone, float *outside_m) {
     const float *px = rows->near_m[0] + begin, *py = rows->near_m[1] + begin,
                 *pz = rows->near_m[2] + begin, *speed = rows->speed_mps + begin;
+    const cone_pass c = *cone;
     for (int i = 0; i < n; i++) {
-        float x = px[i] - c->apex_m[0], y = py[i] - c->apex_m[1], z = pz[i] - c->apex_m[2];
-        float along = x * c->axis[0] + y * c->axis[1] + z * c->axis[2];
+        float x = px[i] - c.apex_m[0], y = py[i] - c.apex_m[1], z = pz[i] - c.apex_m[2];
+        float along = x * c.axis[0] + y * c.axis[1] + z * c.axis[2];
         float square = x * x + y * y + z * z - along * along;
         float across = sqrtf(square > 0.0f ? square : 0.0f);
-        float least = speed[i] < 0.0f ? speed[i] : c->least_mps;
+        float least = speed[i] < 0.0f ? speed[i] : c.least_mps;
         float fastest = speed[i] > least ? speed[i] : least;
-        float outside =
-            across * c->cos_half - along * c->sin_half - fastest * c->span_s - c->sure_m;
-        inside[i] = outside > 0.0f ? 0 : -1;
+        outside_m[i] = across * c.cos_half - along * c.sin_half - fastest * c.span_s - c.sure_m;
     }
+}
+
+/* True if one of a group of objects may be in the cone. */
+static bool any_inside(const float outside_m[GROUP]) {
+    float least = outside_m[0];
+    for (int i = 1; i < GROUP; i++) {
+        least = outside_m[i] < least ? outside_m[i] : least;
+    }
+    return !(least > 0.0f);
 }
 
 /* False if an object of known velocity is certainly outside of the cone. */
@@ -97,19 +104,18 @@ int bst_ephemeris_rows_near(const bst_ephemeris_rows *rows, int objects,
         .span_s = (float)(fabs(s->after_s) + s->cone.half_span_s),
         .sure_m = (float)(s->error_m + s->cone.apex_span_m + ROUNDING_M),
         .least_mps = s->least_mps};
-    int32_t inside[BLOCK + GROUP] = {0};
+    float outside_m[BLOCK + GROUP];
     int count = 0;
     for (int begin = 0; begin < objects; begin += BLOCK) {
         const int n = objects - begin < BLOCK ? objects - begin : BLOCK;
-        mark(rows, begin, n, &pass, inside);
-        memset(inside + n, 0, GROUP * sizeof *inside);
+        distances(rows, begin, n, &pass, outside_m);
+        for (int i = n; i < n + GROUP; i++) {
+            outside_m[i] = INFINITY;
+        }
         for (int k = 0; k < n; k += GROUP) {
-            int32_t any = 0;
-            for (int i = k; i < k + GROUP; i++) {
-                any |= inside[i];
-            }
+            const bool any = any_inside(outside_m + k);
             for (int i = k; any && i < k + GROUP; i++) {
-                if (inside[i] && may_be_in(rows, begin + i, s, sin_half, cos_half)) {
+                if (!(outside_m[i] > 0.0f) && may_be_in(rows, begin + i, s, sin_half, cos_half)) {
                     indices[count++] = begin + i;
                 }
             }

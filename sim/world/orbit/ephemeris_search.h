@@ -7,8 +7,8 @@
 /* Positions of objects at one time, and upper limits of their speeds, GCRF. */
 typedef struct bst_ephemeris_rows {
     double *x_m, *y_m, *z_m; /* NAN: unknown, to be treated as anywhere */
-    float *speed_mps;        /* -INFINITY: no orbit around that time */
-    float *near_m[3];        /* the same positions for the first pass of a search */
+    float *speed_mps;        /* -INFINITY: no orbit around that time; INFINITY: position unknown */
+    float *near_m[3];        /* the same positions, or 0, for the first pass of a search */
     float *velocity_mps[3];  /* NAN: unknown */
 } bst_ephemeris_rows;
 
