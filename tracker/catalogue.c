@@ -60,28 +60,31 @@ int32_t bst_tracker_catalogue_set(bst_tracker_catalogue *c, double seconds) {
     return c->cue_object;
 }
 
-/* Predicts an object; false if it cannot be seen. */
-static bool predict(const bst_tracker_catalogue *c, int object, bst_identity_object *out) {
+/* Predicts an object; false if it cannot be seen within the cone of a search. */
+static bool predict(const bst_tracker_catalogue *c, const bst_tracker_search *search, int object,
+                    bst_identity_object *out) {
     const double h = 0.5; /* s, of the central difference */
     bst_ctx quiet = {0};  /* after the end of an orbit there is no direction: no error here */
-    bst_world_sight sight[3];
-    for (int i = 0; i < 3; i++) {
-        if (bst_knowledge_sight_at(&quiet, c->view, object, c->seconds + (i - 1) * h, &sight[i]) !=
-            BST_OK) {
-            return false;
-        }
+    bst_world_sight now;
+    bst_vec3 middle, before, after;
+    /* most objects are beside the cone, and need no light */
+    if (bst_knowledge_direction_at(&quiet, c->view, object, c->seconds, &middle) != BST_OK ||
+        bst_vec3_angle(middle, search->axis) > search->half_angle_rad ||
+        bst_knowledge_sight_at(&quiet, c->view, object, c->seconds, &now) != BST_OK ||
+        now.occulted || !(now.sunlit_fraction > 0.0) ||
+        bst_knowledge_direction_at(&quiet, c->view, object, c->seconds - h, &before) != BST_OK ||
+        bst_knowledge_direction_at(&quiet, c->view, object, c->seconds + h, &after) != BST_OK) {
+        return false;
     }
-    const bst_world_sight *now = &sight[1];
-    bool bright = isfinite(now->v_mag);
-    *out = (bst_identity_object){
-        .object = object,
-        .direction = now->geometric,
-        .rate_radps = bst_vec3_scale(bst_vec3_sub(sight[2].geometric, sight[0].geometric), 0.5 / h),
-        .sigma_rad = c->sigma_m / now->range_m,
-        .rate_sigma_radps = c->sigma_mps / now->range_m,
-        .v_mag = bright ? now->v_mag : 0.0,
-        .v_mag_sigma = bright ? c->mag_sigma : INFINITY};
-    return !now->occulted && now->sunlit_fraction > 0.0;
+    bool bright = isfinite(now.v_mag);
+    *out = (bst_identity_object){.object = object,
+                                 .direction = now.geometric,
+                                 .rate_radps = bst_vec3_scale(bst_vec3_sub(after, before), 0.5 / h),
+                                 .sigma_rad = c->sigma_m / now.range_m,
+                                 .rate_sigma_radps = c->sigma_mps / now.range_m,
+                                 .v_mag = bright ? now.v_mag : 0.0,
+                                 .v_mag_sigma = bright ? c->mag_sigma : INFINITY};
+    return true;
 }
 
 /* Angle of a direction to the nearest track of a search, without any to its axis. */
@@ -109,8 +112,7 @@ int bst_tracker_catalogue_near(void *user, const bst_tracker_search *search,
     for (int i = 0; i < near; i++) {
         bst_identity_object object;
         if (c->near[i] == c->cue_object || bst_knowledge_is_itself(c->knowledge, c->near[i]) ||
-            !predict(c, c->near[i], &object) ||
-            bst_vec3_angle(object.direction, search->axis) > search->half_angle_rad) {
+            !predict(c, search, c->near[i], &object)) {
             continue;
         }
         int at = count;

@@ -87,7 +87,6 @@ static size_t lay_out(bst_tasking *t) {
     BST_ARENA_TAKE(&t->arena, t->holder, n);
     BST_ARENA_TAKE(&t->arena, t->not_before, n * sensors);
     BST_ARENA_TAKE(&t->arena, t->place_m[0], 3 * n);
-    BST_ARENA_TAKE(&t->arena, t->choices, n);
     return n;
 }
 
@@ -98,7 +97,8 @@ bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *t, const bst_tasking_conf
     *t = (bst_tasking){.config = *config,
                        .tick_rate_hz = tick_rate_hz,
                        .sensor_count = member_count,
-                       .object_count = bst_knowledge_object_count(members[0].knowledge)};
+                       .object_count = bst_knowledge_object_count(members[0].knowledge),
+                       .places_s = NAN};
     (void)lay_out(t);
     char what[64];
     snprintf(what, sizeof what, "the tasks of %d objects", t->object_count);
@@ -154,7 +154,7 @@ static bst_status archive_sensor(bst_tasking *t, int sensor, bst_archive *archiv
     return BST_OK;
 }
 
-/* `place_m` and `choices` are the work space of one plan; `line` follows from the list. */
+/* `place_m` is the work space of a plan; `line` follows from the list. */
 bst_status bst_tasking_archive(bst_tasking *t, bst_archive *archive) {
     size_t objects = (size_t)t->object_count;
     bst_archive_bytes(archive, t->seen_s, objects * sizeof *t->seen_s);
@@ -200,47 +200,92 @@ static bst_task_end ending(const bst_tasking *t, const bst_tasking_sensor *s, do
     return now_s > s->arrival_s + t->config.find_timeout_s ? BST_TASK_NOT_FOUND : BST_TASK_NONE;
 }
 
-/* qsort order: largest value first, then catalogue order. */
-static int compare_choices(const void *a, const void *b) {
-    const bst_tasking_choice *x = a, *y = b;
-    if (x->value != y->value) {
-        return x->value > y->value ? -1 : 1;
-    }
-    return (x->object > y->object) - (x->object < y->object);
+/* Urgency of a target: below 1 it is not due. */
+static double urgency_of(const bst_tasking *t, int object, double now_s) {
+    const bst_tasking_line *line = line_of(t, object);
+    /* a target never observed is due from the start, with growing urgency */
+    double since = t->seen_s[object] < 0.0 ? now_s + line->revisit_s : now_s - t->seen_s[object];
+    return since / line->revisit_s;
 }
 
-/* Lists the targets that are due, unassigned, and visible by a quick check. */
-static int list_choices(bst_tasking *t, int sensor, double now_s) {
-    const bst_tasking_sensor *s = &t->sensors[sensor];
-    const bst_tasking_config *c = &t->config;
-    int count = 0;
-    (void)bst_knowledge_places(s->knowledge, now_s, t->place_m[0], t->place_m[1], t->place_m[2]);
-    for (int i = 0; i < t->object_count; i++) {
-        if (t->line[i] < 0 || t->holder[i] >= 0 || *not_before(t, sensor, i) > (float)now_s) {
-            continue;
-        }
-        const bst_tasking_line *line = line_of(t, i);
-        /* a target never observed is due from the start, with growing urgency */
-        double since = t->seen_s[i] < 0.0 ? now_s + line->revisit_s : now_s - t->seen_s[i];
-        if (since < line->revisit_s) {
-            continue;
-        }
-        bst_vec3 place = {t->place_m[0][i], t->place_m[1][i], t->place_m[2][i]};
-        bst_vec3 direction = s->direction;
-        if (!isnan(place.x) && (bst_vec3_norm(place) == 0.0 ||
-                                bst_tasking_glance(s, place, &direction) != BST_WHY_NOT)) {
-            continue;
-        }
-        double turn = s->pointed ? bst_vec3_angle(s->direction, direction) : 0.0;
-        double slew_s = turn / (c->slew_rate_deg_per_s * BST_DEG_RAD);
-        double work_s = slew_s + c->settle_s + (double)line->frames * s->period_s;
-        t->choices[count++] = (bst_tasking_choice){
-            .object = i,
-            .value = line->priority * fmin(since / line->revisit_s, URGENCY_MOST) / work_s,
-            .slew_s = slew_s};
+/* Value of a target after a slew. */
+static double value_of(const bst_tasking *t, int sensor, int object, double urgency,
+                       double slew_s) {
+    const bst_tasking_line *line = line_of(t, object);
+    double work_s =
+        slew_s + t->config.settle_s + (double)line->frames * t->sensors[sensor].period_s;
+    return line->priority * fmin(urgency, URGENCY_MOST) / work_s;
+}
+
+/* Reads the table of positions, if that of this time is not the one in `place_m`. */
+static void read_places(bst_tasking *t, const bst_knowledge *knowledge, double now_s) {
+    if (bst_knowledge_places_time(now_s) != t->places_s) {
+        t->places_s =
+            bst_knowledge_places(knowledge, now_s, t->place_m[0], t->place_m[1], t->place_m[2]);
     }
-    qsort(t->choices, (size_t)count, sizeof *t->choices, compare_choices);
-    return count;
+}
+
+/* Sets the slew to a target and its value with it. False: by the table of positions it is in a
+ * keep-out zone, in the shadow, or without an orbit. */
+static bool place_choice(const bst_tasking *t, int sensor, double urgency,
+                         bst_tasking_choice *choice) {
+    const bst_tasking_sensor *s = &t->sensors[sensor];
+    const int i = choice->object;
+    bst_vec3 place = {t->place_m[0][i], t->place_m[1][i], t->place_m[2][i]};
+    bst_vec3 direction = s->direction;
+    if (!isnan(place.x) &&
+        (bst_vec3_norm(place) == 0.0 || bst_tasking_glance(s, place, &direction) != BST_WHY_NOT)) {
+        return false;
+    }
+    double turn = s->pointed ? bst_vec3_angle(s->direction, direction) : 0.0;
+    choice->slew_s = turn / (t->config.slew_rate_deg_per_s * BST_DEG_RAD);
+    choice->value = value_of(t, sensor, i, urgency, choice->slew_s);
+    return true;
+}
+
+/* True if a choice comes before another: the larger value, then catalogue order. */
+static bool comes_before(const bst_tasking_choice *a, const bst_tasking_choice *b) {
+    return a->value != b->value ? a->value > b->value : a->object < b->object;
+}
+
+/* The first choices of all, in their order. */
+enum { MOST_CHOICES = 16 };
+typedef struct choice_list {
+    int count;
+    bst_tasking_choice items[MOST_CHOICES];
+} choice_list;
+
+static bool has_room(const choice_list *list, const bst_tasking_choice *choice) {
+    return list->count < MOST_CHOICES || comes_before(choice, &list->items[MOST_CHOICES - 1]);
+}
+
+static void insert_choice(choice_list *list, const bst_tasking_choice *choice) {
+    int at = list->count < MOST_CHOICES ? list->count++ : MOST_CHOICES - 1;
+    for (; at > 0 && comes_before(choice, &list->items[at - 1]); at--) {
+        list->items[at] = list->items[at - 1];
+    }
+    list->items[at] = *choice;
+}
+
+/* Lists the first targets after `last` (NULL: of all) that are due, unassigned, and visible by a
+ * quick check. That is omitted where a target without a slew, the largest value that it can have,
+ * would come after the list. */
+static void list_choices(const bst_tasking *t, int sensor, double now_s,
+                         const bst_tasking_choice *last, choice_list *list) {
+    const float *from_s = &t->not_before[(size_t)sensor * (size_t)t->object_count];
+    list->count = 0;
+    for (int i = 0; i < t->object_count; i++) {
+        if (t->line[i] < 0 || t->holder[i] >= 0 || from_s[i] > (float)now_s) {
+            continue;
+        }
+        double urgency = urgency_of(t, i, now_s);
+        bst_tasking_choice choice = {.object = i, .value = value_of(t, sensor, i, urgency, 0.0)};
+        if (!(urgency < 1.0) && has_room(list, &choice) &&
+            place_choice(t, sensor, urgency, &choice) && has_room(list, &choice) &&
+            (!last || comes_before(last, &choice))) {
+            insert_choice(list, &choice);
+        }
+    }
 }
 
 /* Visibility of an object from arrival to the last wanted frame: geometry at arrival, the smaller
@@ -286,20 +331,32 @@ static void assign_task(bst_tasking *t, int sensor, int64_t tick, bst_task_end b
     }
 }
 
-/* Best target that the sensor can see, -1: none. */
-static bst_status choose_target(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s, int *chosen,
-                                bst_tasking_visibility *seen) {
-    int count = list_choices(t, sensor, now_s);
-    *chosen = -1;
-    for (int i = 0; i < count && i < TRIES && *chosen < 0; i++) {
-        BST_TRY(sees(ctx, t, sensor, &t->choices[i], now_s, seen));
+/* Time after which a target that cannot be seen is tried again. */
+static double retry_after_s(const bst_tasking *t, bst_tasking_why why) {
+    return why == BST_WHY_FAINT    ? t->config.retry_s
+           : why == BST_WHY_ITSELF ? INFINITY
+                                   : HIDDEN_RETRY_S;
+}
+
+/* Best target that the sensor can see; object -1: none. */
+static bst_status choose_target(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s,
+                                bst_tasking_choice *chosen, bst_tasking_visibility *seen) {
+    choice_list list;
+    bst_tasking_choice last;
+    chosen->object = -1;
+    read_places(t, t->sensors[sensor].knowledge, now_s);
+    list_choices(t, sensor, now_s, NULL, &list);
+    for (int tries = 0, k = 0; tries < TRIES && k < list.count; tries++) {
+        BST_TRY(sees(ctx, t, sensor, &list.items[k], now_s, seen));
         if (seen->why == BST_WHY_NOT) {
-            *chosen = i;
-        } else {
-            double wait_s = seen->why == BST_WHY_FAINT    ? t->config.retry_s
-                            : seen->why == BST_WHY_ITSELF ? INFINITY
-                                                          : HIDDEN_RETRY_S;
-            *not_before(t, sensor, t->choices[i].object) = (float)(now_s + wait_s);
+            *chosen = list.items[k];
+            return BST_OK;
+        }
+        last = list.items[k++];
+        *not_before(t, sensor, last.object) = (float)(now_s + retry_after_s(t, seen->why));
+        if (k == MOST_CHOICES) {
+            list_choices(t, sensor, now_s, &last, &list);
+            k = 0;
         }
     }
     return BST_OK;
@@ -326,7 +383,7 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
     double now_s = seconds_of(t, tick);
     bst_task_end before = BST_TASK_NONE;
     bst_tasking_visibility seen;
-    int chosen;
+    bst_tasking_choice chosen;
     if (s->task.object >= 0) {
         before = ending(t, s, now_s);
         if (before == BST_TASK_NONE) {
@@ -338,8 +395,8 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
         }
     }
     BST_TRY(choose_target(ctx, t, sensor, now_s, &chosen, &seen));
-    if (chosen >= 0) {
-        assign_task(t, sensor, tick, before, &t->choices[chosen], &seen);
+    if (chosen.object >= 0) {
+        assign_task(t, sensor, tick, before, &chosen, &seen);
         *given = true;
     } else {
         *given = s->task.object >= 0;

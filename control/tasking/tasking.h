@@ -96,8 +96,8 @@ typedef struct bst_tasking {
     double *seen_s;     /* [object] time of the latest sighting; below 0: none */
     int *holder;        /* [object] index of the sensor whose task it is, -1: none */
     float *not_before;  /* [sensor][object] s: earliest time of the next attempt */
+    double places_s;    /* time of place_m; NAN: none */
     double *place_m[3]; /* [object] */
-    bst_tasking_choice *choices;
     double next_report_s;
 } bst_tasking;
 

@@ -127,7 +127,8 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     const bst_tasking_sensor *s = &t->sensors[sensor];
     const double step_s = 1.0; /* interval of the rate difference */
     bst_ctx quiet = {0};       /* an orbit that has ended is no error here */
-    bst_world_sight now, later;
+    bst_world_sight now;
+    bst_vec3 later;
     bst_world_state eye;
     bst_bodies bodies;
     out->snr = 0.0;
@@ -159,10 +160,10 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     bool reached = true;
     if (out->snr < t->config.min_snr) {
         out->why = BST_WHY_FAINT;
-    } else if (bst_knowledge_sight_at(&quiet, s->view, object, seconds + step_s, &later) !=
+    } else if (bst_knowledge_direction_at(&quiet, s->view, object, seconds + step_s, &later) !=
                BST_OK) {
         out->why = BST_WHY_NO_ORBIT;
-    } else if (bst_vec3_angle(now.geometric, later.geometric) >
+    } else if (bst_vec3_angle(now.geometric, later) >
                t->config.max_rate_arcsec_per_s * BST_ARCSEC_RAD * step_s) {
         out->why = BST_WHY_RATE;
     } else {
@@ -253,8 +254,8 @@ bst_status bst_tasking_survey_look(bst_ctx *ctx, const bst_tasking *t, int senso
 bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,
                               bst_tasking_report *out) {
     *out = (bst_tasking_report){.targets = 0};
-    (void)bst_knowledge_places(t->sensors[0].knowledge, seconds, t->place_m[0], t->place_m[1],
-                               t->place_m[2]);
+    t->places_s = bst_knowledge_places(t->sensors[0].knowledge, seconds, t->place_m[0],
+                                       t->place_m[1], t->place_m[2]);
     for (int i = 0; i < t->object_count; i++) {
         if (t->line[i] < 0) {
             continue;

@@ -40,6 +40,16 @@ typedef struct bst_earth_limb {
 bool bst_earth_limb_at(bst_vec3 position_m, bst_vec3 pole, double height_m, bst_vec3 towards,
                        bst_earth_limb *out);
 
+/* True where the Earth certainly covers nothing of the Sun (*sunlit = 1), or all of it (0): outside
+ * of a cone around the penumbra, or inside of one in the umbra. Decides most positions without the
+ * limb.
+ *
+ * Given:    position_m  geocentric, GCRF axes
+ *           to_sun      from there, m, with its length sun_distance_m
+ *           height_m    by which the Earth is enlarged for *sunlit = 1 */
+bool bst_earth_far_from_shadow(bst_vec3 position_m, bst_vec3 to_sun, double sun_distance_m,
+                               double height_m, double *sunlit);
+
 /* Fraction of the area of a disc with radius `disc` around the direction that is outside the limb,
  * 0..1; units of the tangent plane. */
 double bst_earth_limb_share(const bst_earth_limb *limb, double disc);

@@ -117,9 +117,25 @@ bool bst_earth_limb_at(bst_vec3 position_m, bst_vec3 pole, double height_m, bst_
     return true;
 }
 
+bool bst_earth_far_from_shadow(bst_vec3 position_m, bst_vec3 to_sun, double sun_distance_m,
+                               double height_m, double *sunlit) {
+    double along = -bst_vec3_dot(position_m, to_sun) / sun_distance_m;
+    if (!(along > 0.0) || !(sun_distance_m > 200.0 * BST_SUN_RADIUS_M)) {
+        return false;
+    }
+    double across2 = bst_vec3_dot(position_m, position_m) - along * along;
+    /* half-angle of the cones: the Sun's radius and the Earth's over the distance, and margins of a
+     * tenth, and of 0.1 % of the Earth's radius; 0.996 is more than its flattening takes away */
+    double cone = 1.1 * BST_SUN_RADIUS_M / sun_distance_m * along;
+    double outer = 1.001 * (BST_EARTH_RADIUS_M + height_m) + cone;
+    double inner = 0.995 * BST_EARTH_RADIUS_M - cone;
+    *sunlit = across2 > outer * outer ? 1.0 : 0.0;
+    return *sunlit > 0.0 || (inner > 0.0 && across2 < inner * inner);
+}
+
 double bst_astro_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole) {
     bst_vec3 to_sun = bst_vec3_sub(sun_m, position_m);
-    double distance = bst_vec3_norm(position_m), sun_distance = bst_vec3_norm(to_sun);
+    double distance = bst_vec3_norm(position_m), sun_distance = bst_vec3_norm(to_sun), sunlit;
     if (distance < BST_EARTH_RADIUS_M && bst_earth_depth(position_m, pole) < 0.0) {
         return 0.0;
     }
@@ -129,6 +145,9 @@ double bst_astro_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole
     if (bst_vec3_dot(position_m, to_sun) > 0.0 && distance > 1.0001 * BST_EARTH_RADIUS_M &&
         sun_distance > 200.0 * BST_SUN_RADIUS_M) {
         return 1.0; /* the Earth subtends less than half of the sky, on the other side */
+    }
+    if (bst_earth_far_from_shadow(position_m, to_sun, sun_distance, 0.0, &sunlit)) {
+        return sunlit;
     }
     bst_earth_limb limb;
     if (!bst_earth_limb_at(position_m, pole, 0.0, bst_vec3_scale(to_sun, 1.0 / sun_distance),

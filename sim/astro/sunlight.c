@@ -144,7 +144,15 @@ void bst_astro_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, b
                            bst_astro_sunlight *out) {
     const double top_m = 1e3 * limb_rows[LIMB_ROWS - 1].height_km;
     bst_vec3 to_sun = bst_vec3_sub(sun_m, position_m);
-    double distance = bst_vec3_norm(position_m), sun_distance = bst_vec3_norm(to_sun);
+    double distance = bst_vec3_norm(position_m), sun_distance = bst_vec3_norm(to_sun), sunlit;
+    if (bst_earth_far_from_shadow(position_m, to_sun, sun_distance, top_m, &sunlit) &&
+        sunlit == 1.0) {
+        *out = (bst_astro_sunlight){.disc = 1.0};
+        for (int c = 0; c < BST_SUNLIGHT_COLOURS; c++) {
+            out->light[c] = 1.0;
+        }
+        return;
+    }
     *out = (bst_astro_sunlight){.disc = bst_astro_sun_fraction(position_m, sun_m, pole)};
     double sine = fmin(BST_SUN_RADIUS_M / sun_distance, 0.5);
     bool aired = atmosphere && distance > BST_EARTH_RADIUS_M + 1.001 * top_m;

@@ -121,6 +121,8 @@ bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee
  * orbit. */
 double bst_knowledge_places(const bst_knowledge *knowledge, double seconds, double *x_m,
                             double *y_m, double *z_m);
+/* The time of the positions that bst_knowledge_places returns: those of one time are the same. */
+double bst_knowledge_places_time(double seconds);
 /* Objects that may be in a cone of apparent directions at `seconds`: all that are, and few others.
  *
  * Returned:  *count  in `indices`, ascending; room for all objects is needed */
@@ -132,6 +134,10 @@ int bst_knowledge_cue_object(const bst_knowledge_view *view);
 /* Observer state by onboard navigation, and Sun and Moon at the onboard clock's time. */
 bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_world_state *eye, bst_bodies *bodies) BST_MUST_CHECK;
+/* Geometric direction (GCRF, unit vector) of an object as in bst_knowledge_sight_at, without its
+ * light: the same bits in a third of the time. BST_ERR_NUMERIC: an orbit has ended. */
+bst_status bst_knowledge_direction_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
+                                      double seconds, bst_vec3 *geometric) BST_MUST_CHECK;
 /* Predicted sight of an object from the estimated observer state. BST_ERR_NUMERIC: an orbit has
  * ended. */
 bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,

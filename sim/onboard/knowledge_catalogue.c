@@ -54,6 +54,10 @@ double bst_knowledge_places(const bst_knowledge *k, double seconds, double *x_m,
     return t;
 }
 
+double bst_knowledge_places_time(double seconds) {
+    return bst_ephemeris_places_time(seconds);
+}
+
 bst_status bst_knowledge_near(bst_ctx *ctx, bst_knowledge_view *view, double seconds, bst_vec3 axis,
                               double half_angle_rad, int *indices, int *count) {
     double t;
@@ -76,20 +80,46 @@ bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     return BST_OK;
 }
 
+/* Geometry of an object that the spacecraft sees. */
+typedef struct line_of_sight {
+    double seconds, emission_s; /* of the world: reception and emission */
+    bst_world_state eye, target;
+    bst_sky_rotation sky;
+    bst_vec3 line_m;
+} line_of_sight;
+
+static bst_status line_of_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
+                                   double seconds, line_of_sight *out) {
+    const bst_world *world = view->knowledge->world;
+    BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &out->seconds, &out->eye));
+    BST_TRY(
+        bst_sky_clock_at(ctx, view->clock, bst_time_add(world->epoch, out->seconds), &out->sky));
+    const bst_world_reception at = {&out->eye, view->clock, world->epoch, &out->sky.bodies,
+                                    out->seconds};
+    return bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, &at, false,
+                                         &out->line_m, &out->target, &out->emission_s);
+}
+
+bst_status bst_knowledge_direction_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
+                                      double seconds, bst_vec3 *geometric) {
+    assert(view && geometric && isfinite(seconds));
+    line_of_sight los;
+    BST_TRY(line_of_sight_at(ctx, view, object, seconds, &los));
+    *geometric = bst_vec3_unit(los.line_m);
+    return BST_OK;
+}
+
 bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
                                   double seconds, bst_world_sight *out) {
     assert(view && out && isfinite(seconds));
     const bst_world *world = view->knowledge->world;
     const bst_world_object_info *info = &world->objects[object].info;
-    double t, emission_s;
-    bst_world_state eye, target;
-    bst_sky_rotation sky;
-    bst_vec3 line;
-    BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, &eye));
-    BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_time_add(world->epoch, t), &sky));
-    const bst_world_reception at = {&eye, view->clock, world->epoch, &sky.bodies, t};
-    BST_TRY(bst_world_orbit_line_of_sight(ctx, &world->objects[object].orbit, &at, false, &line,
-                                          &target, &emission_s));
+    line_of_sight los;
+    BST_TRY(line_of_sight_at(ctx, view, object, seconds, &los));
+    const double t = los.seconds, emission_s = los.emission_s;
+    const bst_world_state eye = los.eye, target = los.target;
+    const bst_sky_rotation sky = los.sky;
+    const bst_vec3 line = los.line_m;
     bst_light light = bst_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
     bst_vec3 to_eye = bst_vec3_sub(eye.position_m, target.position_m);
     bst_vec3 to_sun = bst_vec3_sub(sky.bodies.sun_m, target.position_m);

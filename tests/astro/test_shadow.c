@@ -75,7 +75,8 @@ static void places_around_the_earth(void **state) {
     assert_true(sun_at(bst_vec3_make(-4.2e7, 6.7e6, 0), sun) == 1.0);
     double part = sun_at(bst_vec3_make(-4.2e7, BST_EARTH_RADIUS_M, 0), sun);
     assert_true(part > 0.3 && part < 0.7);
-    assert_true(sun_at(bst_vec3_make(0, 0, 0), sun) == 0.0); /* centre of the Earth */
+    assert_true(sun_at(bst_vec3_make(-1e7, 4e8, 0), sun) == 1.0); /* beside, as far as the Moon */
+    assert_true(sun_at(bst_vec3_make(0, 0, 0), sun) == 0.0);      /* centre of the Earth */
     assert_true(sun_at(bst_vec3_make(1e6, 0, 0), sun) == 0.0);
     assert_true(sun_at(bst_vec3_make(BST_EARTH_RADIUS_M, 0, 0), sun) == 1.0);
     assert_true(sun_at(bst_vec3_make(-BST_EARTH_RADIUS_M, 0, 0), sun) == 0.0);

@@ -114,8 +114,12 @@ static void objects_near_a_direction(void **state) {
             listed = listed || indices[k] == i;
         }
         bst_ctx quiet = {0};
-        if (i != SELF && bst_knowledge_sight_at(&quiet, s.onboard, i, t, &other) == BST_OK &&
-            bst_vec3_angle(other.apparent, at.apparent) <= half) {
+        bst_vec3 direction;
+        bst_status status = bst_knowledge_sight_at(&quiet, s.onboard, i, t, &other);
+        assert_int_equal(bst_knowledge_direction_at(&quiet, s.onboard, i, t, &direction), status);
+        assert_true(status != BST_OK ||
+                    memcmp(&direction, &other.geometric, sizeof direction) == 0);
+        if (i != SELF && status == BST_OK && bst_vec3_angle(other.apparent, at.apparent) <= half) {
             in_cone++;
             found += listed;
         }

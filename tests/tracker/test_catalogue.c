@@ -84,6 +84,16 @@ bst_status __wrap_bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view,
     return BST_OK;
 }
 
+bst_status __wrap_bst_knowledge_direction_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
+                                             double seconds, bst_vec3 *geometric);
+bst_status __wrap_bst_knowledge_direction_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
+                                             double seconds, bst_vec3 *geometric) {
+    bst_world_sight sight;
+    BST_TRY(__wrap_bst_knowledge_sight_at(ctx, view, object, seconds, &sight));
+    *geometric = sight.geometric;
+    return BST_OK;
+}
+
 static bst_tracker_catalogue *create(bst_ctx *ctx) {
     static char nothing; /* the functions above do not look at it */
     const bst_tracker_config config = {

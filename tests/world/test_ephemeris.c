@@ -242,6 +242,62 @@ static void a_day_takes_no_more_memory_than_a_minute(void **state) {
     bst_world_free(world);
 }
 
+/* How far a position is outside of a cone, m. */
+static double outside_m(const bst_ephemeris_cone *cone, bst_vec3 place_m, double half_rad) {
+    bst_vec3 d = bst_vec3_sub(place_m, cone->apex_m);
+    double along = bst_vec3_dot(d, cone->axis);
+    double across = bst_vec3_norm(bst_vec3_axpy(d, -along, cone->axis));
+    return across * cos(half_rad) - along * sin(half_rad);
+}
+
+/* A search finds all objects in a cone, at all times between two tables, and others only within its
+ * tolerances: 11.5 km/s in the span, two times 1 km, and 5e-4 rad of aberration and light time. In
+ * the 4 s from a table a low object moves by 31 km. */
+static void a_search_finds_what_is_in_the_cone_and_little_beside_it(void **state) {
+    (void)state;
+    enum { COUNT = 1500, CONES = 400 };
+    bst_world *world = populated(COUNT, 3.0);
+    int *near = malloc(COUNT * sizeof *near), found = 0, beside = 0;
+    assert_non_null(near);
+    for (int k = 0; k < CONES; k++) {
+        /* towards an object, from places between 100 km and 40,000 km away */
+        double t = 8.0 * k + 8.0 * drawn(k, 10), half_span_s = 0.5 * (k % 2);
+        bst_vec3 aim, velocity, p;
+        if (!bst_ephemeris_at(world->ephemeris, NULL, k, t, &aim, &velocity)) {
+            continue;
+        }
+        bst_ephemeris_cone cone = {.half_angle_rad = 0.3 * drawn(k, 11) * drawn(k, 12),
+                                   .half_span_s = half_span_s};
+        bst_vec3 way =
+            bst_vec3_unit((bst_vec3){drawn(k, 13) - 0.5, drawn(k, 14) - 0.5, drawn(k, 15) - 0.5});
+        cone.apex_m = bst_vec3_axpy(aim, -1e5 * pow(400.0, drawn(k, 16)), way);
+        cone.axis = way;
+        int count = bst_ephemeris_near(world->ephemeris, t, &cone, near), next = 0;
+        for (int i = 0; i < COUNT; i++) {
+            double least = INFINITY;
+            bool known = true;
+            for (int j = -1; j <= 1; j++) {
+                known = known && bst_ephemeris_at(world->ephemeris, NULL, i, t + j * half_span_s,
+                                                  &p, &velocity);
+                least = fmin(least, outside_m(&cone, p, cone.half_angle_rad));
+            }
+            bool listed = next < count && near[next] == i;
+            next += listed;
+            found += known && least <= 0.0;
+            assert_true(listed || !known || least > 0.0);
+            if (listed && known && least > 0.0) {
+                beside++;
+                assert_true(outside_m(&cone, p, cone.half_angle_rad + 5e-4) <
+                            2.0 * 11500.0 * (half_span_s + 1e-3) + 2001.0);
+            }
+        }
+        assert_int_equal(next, count);
+    }
+    assert_true(found > 1000 && beside > 10);
+    free(near);
+    bst_world_free(world);
+}
+
 static void what_has_decayed_stays_away(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -491,6 +547,7 @@ int main(void) {
         cmocka_unit_test(a_day_takes_no_more_memory_than_a_minute),
         cmocka_unit_test(what_has_decayed_stays_away),
         cmocka_unit_test(a_decay_that_is_ahead_changes_no_table),
+        cmocka_unit_test(a_search_finds_what_is_in_the_cone_and_little_beside_it),
         cmocka_unit_test(near_objects_are_evaluated_directly),
         cmocka_unit_test(no_object_is_missed),
         cmocka_unit_test(three_observers_share_it),

@@ -24,9 +24,10 @@ static double expected_s(const logical_process *self) {
  * the one with the smallest clock, then the one with the longest window. NULL: none can step. */
 static logical_process *next_process(bst_executor *x, bool caller) {
     logical_process *best = NULL;
+    const int64_t least = bst_sync_least_clock(x);
     for (int k = 0; k < x->count; k++) {
         logical_process *self = &x->processes[k];
-        if (!may_step(x, self, caller) || !bst_sync_can_step(x, self)) {
+        if (!may_step(x, self, caller) || !bst_sync_can_step(x, self, least)) {
             continue;
         }
         if (self->kind == BST_PROCESS_LINK) {

@@ -74,11 +74,13 @@ typedef struct logical_process {
     int member_count;
     process_input *inputs;
     int input_count;
-    bool delivers; /* messages of another process trigger an instance */
-    int source;    /* of a deferred process: the process that copies its inputs; else -1 */
-    int looker;    /* of a deferred process: the instance with `ahead`; -1: none */
-    bool linked;   /* of a sensor process: multi-sensor modules read from it */
-    int frames;    /* frames retained by observers and copies; atomic */
+    bool delivers;     /* messages of another process trigger an instance */
+    int source;        /* of a deferred process: the process that copies its inputs; else -1 */
+    int follower;      /* the first deferred process whose source this is; -1: none */
+    int next_follower; /* of a deferred process: the next one of its source; -1: none */
+    int looker;        /* of a deferred process: the instance with `ahead`; -1: none */
+    bool linked;       /* of a sensor process: multi-sensor modules read from it */
+    int frames;        /* frames retained by observers and copies; atomic */
 
     /* used only by the thread that steps the process */
     bst_heap heap;
@@ -157,8 +159,11 @@ void bst_process_step(bst_executor *x, logical_process *self);
 void bst_process_look(bst_executor *x, logical_process *self, const sample_point *sample);
 
 /* synchronisation.c; call these with the lock held */
-/* Checks whether a process can be stepped now, and sets the limit of its window. */
-bool bst_sync_can_step(bst_executor *x, logical_process *self);
+/* The clock of the slowest logical process. */
+int64_t bst_sync_least_clock(const bst_executor *x);
+/* Checks whether a process can be stepped now, and sets the limit of its window. least: that of
+ * bst_sync_least_clock. */
+bool bst_sync_can_step(bst_executor *x, logical_process *self, int64_t least);
 /* Publishes the progress of a process after a window. */
 void bst_sync_end_window(bst_executor *x, logical_process *self);
 /* Updates deferred processes and multi-sensor modules with the progress of a process. */

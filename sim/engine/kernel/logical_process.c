@@ -99,17 +99,11 @@ static int64_t next_link_tick(const bst_executor *x, int64_t tick) {
     return next;
 }
 
-/* Checks whether a deferred process takes its inputs from this process. */
-static bool is_source_of(const bst_executor *x, const logical_process *self,
-                         const logical_process *other) {
-    return other->kind == BST_PROCESS_DEFERRED && &x->processes[other->source] == self;
-}
-
 /* Copies the inputs of other processes at the end of a tick. *any: another process may step now. */
 static bst_status copy_for_others(bst_executor *x, logical_process *self, int64_t tick, bool *any) {
-    for (int k = 0; self->kind == BST_PROCESS_SENSORS && k < x->count; k++) {
+    for (int k = self->follower; k >= 0; k = x->processes[k].next_follower) {
         logical_process *other = &x->processes[k];
-        if (is_source_of(x, self, other) && other->sample_due <= tick) {
+        if (other->sample_due <= tick) {
             BST_TRY(copy_inputs(x, self, other, tick));
             announce(x->engine, other, tick);
             other->sampled = *any = true;
@@ -152,9 +146,9 @@ static void trim(bst_executor *x, const logical_process *self) {
 /* The next tick at which a module steps or another process samples its inputs. */
 static int64_t next_tick(const bst_executor *x, const logical_process *self) {
     int64_t tick = self->heap.count > 0 ? x->engine->due[self->heap.items[0]] : INT64_MAX;
-    for (int k = 0; self->kind == BST_PROCESS_SENSORS && k < x->count; k++) {
+    for (int k = self->follower; k >= 0; k = x->processes[k].next_follower) {
         const logical_process *other = &x->processes[k];
-        if (is_source_of(x, self, other) && other->sample_due < tick) {
+        if (other->sample_due < tick) {
             tick = other->sample_due;
         }
     }

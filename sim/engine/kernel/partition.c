@@ -124,7 +124,7 @@ static bst_status fill_process(bst_ctx *ctx, bst_executor *x, int number) {
     size_t room = (size_t)engine->instance_count + 1, ports = 1;
     bst_ctx_init(&self->ctx, ctx->log, ctx->log_user, ctx->log_level);
     self->last_tick = -1;
-    self->source = self->looker = -1;
+    self->source = self->looker = self->follower = self->next_follower = -1;
     self->sample_due = INT64_MAX;
     self->last_numbered_tick = INT64_MIN;
     self->members = calloc(room, sizeof *self->members);
@@ -171,8 +171,11 @@ static bst_status connect(bst_ctx *ctx, bst_executor *x, instance *reader, int p
                                                         .mode = port->copies,
                                                         .output = &writer->ports[ch->writer_port],
                                                         .delay_ticks = port->delay_ticks};
-    if (self->kind == BST_PROCESS_DEFERRED && from->kind == BST_PROCESS_SENSORS) {
+    if (self->kind == BST_PROCESS_DEFERRED && from->kind == BST_PROCESS_SENSORS &&
+        self->source < 0) {
         self->source = writer->process;
+        self->next_follower = from->follower;
+        from->follower = reader->process;
     }
     if (bst_instance_port(reader, p)->flags & BST_PORT_TRIGGER) {
         self->delivers = true;

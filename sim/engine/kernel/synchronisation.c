@@ -8,8 +8,7 @@ void bst_sync_wake(bst_executor *x) {
     }
 }
 
-/* The clock of the slowest logical process. */
-static int64_t least_clock(const bst_executor *x) {
+int64_t bst_sync_least_clock(const bst_executor *x) {
     int64_t least = INT64_MAX;
     for (int k = 0; k < x->count; k++) {
         least = x->processes[k].clock < least ? x->processes[k].clock : least;
@@ -29,10 +28,10 @@ static int64_t safe_before(const bst_executor *x, const process_input *input) {
     return bst_tick_sum(silent, input->delay_ticks);
 }
 
-/* End of the next window of a logical process, exclusive. */
-static int64_t limit_of(const bst_executor *x, const logical_process *self) {
+/* End of the next window of a logical process, exclusive. least: clock of the slowest process. */
+static int64_t limit_of(const bst_executor *x, const logical_process *self, int64_t least) {
     int64_t rate = x->engine->tick_rate_hz, limit = x->end;
-    int64_t lead = bst_tick_sum(least_clock(x), BST_MOST_LEAD_S * rate);
+    int64_t lead = bst_tick_sum(least, BST_MOST_LEAD_S * rate);
     limit = lead < limit ? lead : limit;
     for (int i = 0; i < self->input_count; i++) {
         int64_t safe = safe_before(x, &self->inputs[i]);
@@ -62,17 +61,16 @@ static bool has_room(const bst_executor *x, const logical_process *self) {
         __atomic_load_n(&self->frames, __ATOMIC_RELAXED) > BST_MOST_FRAMES_HELD) {
         return false;
     }
-    for (int k = 0; self->kind == BST_PROCESS_SENSORS && k < x->count; k++) {
+    for (int k = self->follower; k >= 0; k = x->processes[k].next_follower) {
         const logical_process *other = &x->processes[k];
-        if (other->kind == BST_PROCESS_DEFERRED && &x->processes[other->source] == self &&
-            other->next_sample - other->first_sample >= BST_MOST_SAMPLES) {
+        if (other->next_sample - other->first_sample >= BST_MOST_SAMPLES) {
             return false;
         }
     }
     return true;
 }
 
-bool bst_sync_can_step(bst_executor *x, logical_process *self) {
+bool bst_sync_can_step(bst_executor *x, logical_process *self, int64_t least) {
     if (self->busy || self->status != BST_OK || self->clock >= x->end || !has_room(x, self)) {
         return false;
     }
@@ -81,7 +79,7 @@ bool bst_sync_can_step(bst_executor *x, logical_process *self) {
          self->samples[self->first_sample % BST_MOST_SAMPLES].look == BST_LOOK_BUSY)) {
         return false;
     }
-    self->limit = limit_of(x, self);
+    self->limit = limit_of(x, self, least);
     if (self->linked && !x->link_ahead) {
         self->link_tick =
             x->processes[x->link].horizon < self->clock ? INT64_MAX : x->processes[x->link].horizon;
@@ -105,7 +103,7 @@ static void follow_source(const bst_executor *x, logical_process *self) {
 static void advance_link(const bst_executor *x) {
     logical_process *link = x->link >= 0 ? &x->processes[x->link] : NULL;
     if (link && !link->busy && link->status == BST_OK) {
-        int64_t limit = limit_of(x, link);
+        int64_t limit = limit_of(x, link, bst_sync_least_clock(x));
         if (limit > link->clock && link->horizon >= limit) {
             link->clock = limit;
         }
@@ -127,12 +125,9 @@ static void take_sample(logical_process *self) {
 }
 
 void bst_sync_follow(bst_executor *x, const logical_process *source) {
-    for (int k = 0; k < x->count; k++) {
-        logical_process *other = &x->processes[k];
-        if (other->kind == BST_PROCESS_DEFERRED && &x->processes[other->source] == source) {
-            take_sample(other);
-            follow_source(x, other);
-        }
+    for (int k = source->follower; k >= 0; k = x->processes[k].next_follower) {
+        take_sample(&x->processes[k]);
+        follow_source(x, &x->processes[k]);
     }
     advance_link(x);
 }

@@ -8,8 +8,8 @@
 
 #include "sim/core/invariant.h"
 #include "sim/core/parallel.h"
-#include "sim/core/simd.h"
 #include "sim/world/orbit/ephemeris_polynomial.h"
+#include "sim/world/orbit/ephemeris_search.h"
 
 /* the bodies form groups that compute their next knot at different times */
 enum { SHARES = 16 };
@@ -53,9 +53,7 @@ typedef struct table {
     int64_t index; /* time / TABLE_STEP_S */
     bool valid;
     int users; /* threads that read the table without the lock */
-    /* positions, GCRF; NAN: unknown, to be treated as anywhere */
-    double *x_m, *y_m, *z_m;
-    double *speed_mps; /* upper limit of the speed; -INFINITY: no orbit around that time */
+    bst_ephemeris_rows rows;
 } table;
 
 struct bst_ephemeris {
@@ -70,7 +68,7 @@ struct bst_ephemeris {
     int64_t knots_made; /* by readers, not for tables */
     rotations rotations[STEP_CLASSES];
     table tables[TABLES];
-    double *table_memory;
+    char *table_memory;
 };
 
 /* Knot spacing in s of a step class of the object ephemeris. */
@@ -267,6 +265,7 @@ typedef struct table_class {
     int64_t first;       /* first of the CHECKED knots */
     double late;         /* fraction of the current interval between knots */
     double weight[RING]; /* by ring slot; 0: the knot is not used */
+    double slope[RING];  /* the same of the velocity, 1/s */
 } table_class;
 
 typedef struct table_job {
@@ -276,18 +275,16 @@ typedef struct table_job {
     bst_mat3 gcrf_from_teme[3]; /* one grid step before, at and after the time of the table */
 } table_job;
 
-/* Computes the table entry of an object that cannot be interpolated. False: no orbit at that
- * time. */
-static bool table_row_directly(const table_job *job, const bst_world_orbit *orbit, int i) {
+/* Computes the place of an object that cannot be interpolated. False: no orbit at that time. */
+static bool place_directly(const table_job *job, const bst_world_orbit *orbit, double place[3]) {
     double seconds = (double)job->table->index * TABLE_STEP_S;
     bst_vec3 p = place_at(orbit, &job->gcrf_from_teme[1], seconds);
     bool none = isnan(p.x) &&
                 isnan(place_at(orbit, &job->gcrf_from_teme[0], seconds - TABLE_STEP_S).x) &&
                 isnan(place_at(orbit, &job->gcrf_from_teme[2], seconds + TABLE_STEP_S).x);
-    job->table->x_m[i] = none ? 0.0 : p.x;
-    job->table->y_m[i] = none ? 0.0 : p.y;
-    job->table->z_m[i] = none ? 0.0 : p.z;
-    job->table->speed_mps[i] = -INFINITY;
+    place[0] = none ? 0.0 : p.x;
+    place[1] = none ? 0.0 : p.y;
+    place[2] = none ? 0.0 : p.z;
     return !none;
 }
 
@@ -323,30 +320,30 @@ static void table_rows(void *user, int begin, int end) {
     for (int i = begin; i < end; i++) {
         const body *b = &job->e->bodies[i];
         if (!b->orbit) {
-            t->x_m[i] = t->y_m[i] = t->z_m[i] = NAN;
+            const double unknown[3] = {NAN, NAN, NAN};
+            bst_ephemeris_rows_set(&t->rows, i, unknown, NULL, 0.0);
             continue;
         }
         const table_class *c = &job->classes[b->step_class];
-        double p[3] = {0};
+        double p[3] = {0}, v[3] = {0};
         for (int slot = 0; slot < RING; slot++) {
             for (int j = 0; j < 3; j++) {
                 p[j] += c->weight[slot] * b->place_m[j][slot];
+                v[j] += c->slope[slot] * b->place_m[j][slot];
             }
         }
         if (isnan(p[0])) {
             sum_used_knots(c, b, p);
         }
-        t->x_m[i] = p[0];
-        t->y_m[i] = p[1];
-        t->z_m[i] = p[2];
-        if (isnan(p[0]) && !table_row_directly(job, b->orbit, i)) {
+        if (isnan(p[0]) && !place_directly(job, b->orbit, p)) {
+            bst_ephemeris_rows_set(&t->rows, i, p, NULL, -INFINITY);
             continue;
         }
         /* at most the escape speed at the lowest radius that it can reach */
         double low = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) -
                      (TABLE_SPAN_S * HIGHEST_SPEED_MPS + TABLE_ERROR_M);
         double speed = 1.02 * sqrt(2.0 * BST_EARTH_MU_M3PS2 / fmax(low, 6.2e6));
-        t->speed_mps[i] = fmin(speed, HIGHEST_SPEED_MPS);
+        bst_ephemeris_rows_set(&t->rows, i, p, v, fmin(speed, HIGHEST_SPEED_MPS));
     }
 }
 
@@ -361,6 +358,7 @@ static void make_table(bst_ephemeris *e, table *t, int64_t index) {
         lagrange(seconds / step - whole, weight, slope);
         for (int j = 0; j < POINTS; j++) {
             out->weight[slot_of(out->first + 1 + j, RING)] = weight[j];
+            out->slope[slot_of(out->first + 1 + j, RING)] = slope[j] / step;
         }
         out->late = seconds / step - whole;
         int ahead = out->late + (double)(SHARES - 1) / SHARES >= 1.0;
@@ -399,31 +397,6 @@ static table *table_at(bst_ephemeris *e, int64_t index) {
     return t;
 }
 
-/* A search cone with the uncertainty of the tabulated positions. */
-typedef struct search {
-    bst_vec3 apex_m, axis;
-    double sin_half, cos_half, span_s, sure_m;
-    double least_mps; /* speed limit outside the validity of the table, else 0 */
-} search;
-
-/* Distance of n objects from the surface of the cone, minus their position uncertainty. NAN:
- * unknown. Behind the apex the value is an upper limit. */
-BST_CLONES_256 static void distances(const table *t, int begin, int n, const search *c,
-                                     double *outside_m) {
-    const double *px = t->x_m + begin, *py = t->y_m + begin, *pz = t->z_m + begin,
-                 *speed = t->speed_mps + begin;
-    const bst_vec3 o = c->apex_m, axis = c->axis;
-    for (int i = 0; i < n; i++) {
-        double x = px[i] - o.x, y = py[i] - o.y, z = pz[i] - o.z;
-        double along = x * axis.x + y * axis.y + z * axis.z;
-        double square = x * x + y * y + z * z - along * along;
-        double across = sqrt(square > 0.0 ? square : 0.0);
-        double least = speed[i] < 0.0 ? speed[i] : c->least_mps;
-        double fastest = speed[i] > least ? speed[i] : least;
-        outside_m[i] = across * c->cos_half - along * c->sin_half - fastest * c->span_s - c->sure_m;
-    }
-}
-
 int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_cone *cone,
                        int *indices) {
     assert(e && cone && indices && bst_is_unit_vec3(cone->axis, 1e-6));
@@ -436,43 +409,41 @@ int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_con
     }
     int64_t index = llround(seconds / TABLE_STEP_S);
     double span = fabs(seconds - (double)index * TABLE_STEP_S) + cone->half_span_s + 1e-3;
-    const search c = {.apex_m = cone->apex_m,
-                      .axis = cone->axis,
-                      .sin_half = sin(cone->half_angle_rad + SHIFT_RAD),
-                      .cos_half = cos(cone->half_angle_rad + SHIFT_RAD),
-                      .span_s = span,
-                      .sure_m = TABLE_ERROR_M + cone->apex_span_m,
-                      .least_mps = span < TABLE_SPAN_S ? 0.0 : HIGHEST_SPEED_MPS};
+    bst_ephemeris_search search = {
+        .cone = *cone,
+        .after_s = seconds - (double)index * TABLE_STEP_S,
+        .error_m = TABLE_ERROR_M,
+        .shift_rad = SHIFT_RAD,
+        .least_mps = span < TABLE_SPAN_S ? 0.0f : (float)HIGHEST_SPEED_MPS};
+    search.cone.half_span_s += 1e-3;
     pthread_mutex_lock(&e->lock);
     table *t = table_at(e, index);
     t->users++;
     pthread_mutex_unlock(&e->lock);
-    enum { BLOCK = 256 };
-    double outside[BLOCK];
-    for (int begin = 0; begin < e->object_count; begin += BLOCK) {
-        int n = e->object_count - begin < BLOCK ? e->object_count - begin : BLOCK;
-        distances(t, begin, n, &c, outside);
-        for (int i = 0; i < n; i++) {
-            if (!(outside[i] > 0.0)) {
-                indices[count++] = begin + i;
-            }
-        }
-    }
+    count = bst_ephemeris_rows_near(&t->rows, e->object_count, &search, indices);
     pthread_mutex_lock(&e->lock);
     t->users--;
     pthread_mutex_unlock(&e->lock);
     return count;
 }
 
+static int64_t table_index(double seconds) {
+    return llround(fmax(fmin(seconds, 1e9), -1e9) / TABLE_STEP_S);
+}
+
+double bst_ephemeris_places_time(double seconds) {
+    return (double)table_index(seconds) * TABLE_STEP_S;
+}
+
 double bst_ephemeris_places(bst_ephemeris *e, double seconds, double *x_m, double *y_m,
                             double *z_m) {
-    int64_t index = llround(fmax(fmin(seconds, 1e9), -1e9) / TABLE_STEP_S);
+    int64_t index = table_index(seconds);
     size_t bytes = (size_t)e->object_count * sizeof *x_m;
     pthread_mutex_lock(&e->lock);
     const table *t = table_at(e, index);
-    memcpy(x_m, t->x_m, bytes);
-    memcpy(y_m, t->y_m, bytes);
-    memcpy(z_m, t->z_m, bytes);
+    memcpy(x_m, t->rows.x_m, bytes);
+    memcpy(y_m, t->rows.y_m, bytes);
+    memcpy(z_m, t->rows.z_m, bytes);
     pthread_mutex_unlock(&e->lock);
     return (double)index * TABLE_STEP_S;
 }
@@ -538,9 +509,9 @@ bst_status bst_ephemeris_create(bst_ctx *ctx, const bst_world *world, bst_epheme
     e->body_count = world->object_count + world->observer_count;
     double tolerance = fmin(1e-3 * sharpest_pixel(world) * BST_EPHEMERIS_NEAREST_M, 1.0);
     e->limit_m = fmax(tolerance, ROUNDING_M) / SAFETY;
-    size_t rows = (size_t)e->object_count + 1;
+    const size_t table_bytes = (bst_ephemeris_rows_bytes(e->object_count) + 63) / 64 * 64;
     e->bodies = calloc((size_t)e->body_count + 1, sizeof *e->bodies);
-    e->table_memory = calloc(rows * 4 * TABLES, sizeof *e->table_memory);
+    e->table_memory = calloc(TABLES, table_bytes);
     bst_status status =
         e->bodies && e->table_memory
             ? bst_sky_clock_create_on(ctx, world->sky_grid, &e->clock_knots)
@@ -553,11 +524,8 @@ bst_status bst_ephemeris_create(bst_ctx *ctx, const bst_world *world, bst_epheme
         return status;
     }
     for (int i = 0; i < TABLES; i++) {
-        double *memory = e->table_memory + rows * 4 * (size_t)i;
-        e->tables[i] = (table){.x_m = memory,
-                               .y_m = memory + rows,
-                               .z_m = memory + 2 * rows,
-                               .speed_mps = memory + 3 * rows};
+        e->tables[i].rows =
+            bst_ephemeris_rows_in(e->table_memory + table_bytes * (size_t)i, e->object_count);
     }
     for (int c = 0; c < STEP_CLASSES; c++) {
         for (int slot = 0; slot < ROTATIONS; slot++) {

@@ -86,4 +86,7 @@ int bst_ephemeris_near(bst_ephemeris *ephemeris, double seconds, const bst_ephem
 double bst_ephemeris_places(bst_ephemeris *ephemeris, double seconds, double *x_m, double *y_m,
                             double *z_m);
 
+/* That multiple of 8 s. Positions of the same one have the same bits. */
+double bst_ephemeris_places_time(double seconds);
+
 #endif

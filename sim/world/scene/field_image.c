@@ -65,11 +65,19 @@ void bst_scene_image_add_disc(const bst_camera *camera, bst_quat q_mid,
     e1 = bst_vec3_unit(
         bst_vec3_cross(fabs(z.z) < 0.9 ? (bst_vec3){0, 0, 1} : (bst_vec3){1, 0, 0}, z));
     e2 = bst_vec3_cross(z, e1);
+    double cosine[2][AROUND], sine[2][AROUND]; /* of even and odd rings */
+    for (int n = 0; n < 2 * AROUND; n++) {
+        double a = 2.0 * BST_PI * (n % AROUND + 0.5 * (n / AROUND)) / AROUND;
+        cosine[n / AROUND][n % AROUND] = cos(a);
+        sine[n / AROUND][n % AROUND] = sin(a);
+    }
     for (int n = 0; n <= TIMES * AROUND; n++) {
         /* rings of equal area, and the specular point */
         double s = source->shape->radius * sqrt((n / AROUND + 0.5) / TIMES);
-        double a = 2.0 * BST_PI * (n % AROUND + 0.5 * (n / AROUND % 2)) / AROUND, x, y;
-        bst_vec3 d = bst_vec3_axpy(bst_vec3_axpy(z, s * cos(a), e1), s * sin(a), e2), ray = d;
+        const int odd = n / AROUND % 2, k = n % AROUND;
+        double x, y;
+        bst_vec3 d = bst_vec3_axpy(bst_vec3_axpy(z, s * cosine[odd][k], e1), s * sine[odd][k], e2);
+        bst_vec3 ray = d;
         double share = 0.0;
         if (n == TIMES * AROUND) {
             ray = bst_vec3_add(z, bst_disc_specular(source));
@@ -169,40 +177,51 @@ static bool path_in_pieces(const bst_camera *camera, const bst_los_track *track,
     return true;
 }
 
-/* Light per px^2 of a straight piece of uniform light at the place (dx, dy) from its middle,
- * blurred by a Gaussian of variance 2 v. */
-static double light_of_piece(double light, double step_x, double step_y, double dx, double dy,
-                             double v) {
-    double length2 = step_x * step_x + step_y * step_y;
-    if (length2 < 0.09 * v) { /* as a point: right to 0.09 / 96 */
-        return light * exp(-0.25 * (dx * dx + dy * dy) / v) / (4.0 * BST_PI * v);
+/* A straight piece of uniform light. */
+typedef struct piece {
+    double light, x, y;            /* x, y: its middle */
+    double step_x, step_y, length; /* length 0: as a point */
+    double near2;                  /* square of the distance from which its light counts */
+} piece;
+
+/* Light per px^2 of a piece at the place (dx, dy) from its middle, blurred by a Gaussian of
+ * variance 2 v. scale: 0.5 / sqrt(v); peak: sqrt(16 pi v). */
+static double light_of_piece(const piece *p, double dx, double dy, double v, double scale,
+                             double peak) {
+    if (p->length == 0.0) {
+        return p->light * exp(-0.25 * (dx * dx + dy * dy) / v) / (4.0 * BST_PI * v);
     }
-    double length = sqrt(length2), along = (dx * step_x + dy * step_y) / length;
-    double across = (dy * step_x - dx * step_y) / length, scale = 0.5 / sqrt(v);
-    return light / length * exp(-0.25 * across * across / v) / sqrt(16.0 * BST_PI * v) *
-           (erf((0.5 * length - along) * scale) + erf((0.5 * length + along) * scale));
+    double along = (dx * p->step_x + dy * p->step_y) / p->length;
+    double across = (dy * p->step_x - dx * p->step_y) / p->length, half = 0.5 * p->length;
+    return p->light / p->length * exp(-0.25 * across * across / v) / peak *
+           (erf((half - along) * scale) + erf((half + along) * scale));
 }
 
 /* The integral of the squared light of a path that is blurred by a Gaussian of variance v: the sum
  * over its pieces of their light times the light of all pieces, blurred twice, in their middles. */
 static double squared_light_of_path(const light_path *path, double v) {
     const double far = 12.0 * sqrt(v); /* where a point's light has fallen to exp(-36) */
-    double x[MOST_PIECES], y[MOST_PIECES], near2[MOST_PIECES];
+    const double scale = 0.5 / sqrt(v), peak = sqrt(16.0 * BST_PI * v);
+    piece pieces[MOST_PIECES];
     double total = 0.0, sum = 0.0;
     for (int k = 0; k < path->count; k++) {
         double dx = path->x[k + 1] - path->x[k], dy = path->y[k + 1] - path->y[k];
-        double near = 0.5 * sqrt(dx * dx + dy * dy) + far;
-        x[k] = path->x[k] + 0.5 * dx;
-        y[k] = path->y[k] + 0.5 * dy;
-        near2[k] = near * near;
+        double length2 = dx * dx + dy * dy, length = sqrt(length2), near = 0.5 * length + far;
+        pieces[k] = (piece){.light = path->light[k],
+                            .x = path->x[k] + 0.5 * dx,
+                            .y = path->y[k] + 0.5 * dy,
+                            .step_x = dx,
+                            .step_y = dy,
+                            /* shorter ones as points: right to 0.09 / 96 */
+                            .length = length2 < 0.09 * v ? 0.0 : length,
+                            .near2 = near * near};
     }
     for (int k = 0; k < path->count; k++) {
         double light = 0.0;
         for (int i = 0; i < path->count; i++) {
-            double dx = x[k] - x[i], dy = y[k] - y[i];
-            if (dx * dx + dy * dy < near2[i]) {
-                light += light_of_piece(path->light[i], path->x[i + 1] - path->x[i],
-                                        path->y[i + 1] - path->y[i], dx, dy, v);
+            double dx = pieces[k].x - pieces[i].x, dy = pieces[k].y - pieces[i].y;
+            if (dx * dx + dy * dy < pieces[i].near2) {
+                light += light_of_piece(&pieces[i], dx, dy, v, scale, peak);
             }
         }
         total += path->light[k];

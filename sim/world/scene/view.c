@@ -409,15 +409,27 @@ bst_status bst_world_view_path(bst_ctx *ctx, bst_world_view *view, const bst_wor
     return BST_OK;
 }
 
-/* Quartic through five positions. */
-static bst_vec3 quartic(const bst_vec3 place[BST_PATH_NODES], double u) {
+/* Weights of the five positions of a quartic. */
+typedef struct quartic {
+    double weight[BST_PATH_NODES];
+} quartic;
+
+static quartic quartic_at(double u) {
+    quartic q;
+    for (int k = 0; k < BST_PATH_NODES; k++) {
+        q.weight[k] = 1.0;
+        for (int m = 0; m < BST_PATH_NODES; m++) {
+            q.weight[k] *= m == k ? 1.0 : (u * (BST_PATH_NODES - 1) - m) / (k - m);
+        }
+    }
+    return q;
+}
+
+/* The quartic through five positions. */
+static bst_vec3 through(const quartic *q, const bst_vec3 place[BST_PATH_NODES]) {
     bst_vec3 sum = {0};
     for (int k = 0; k < BST_PATH_NODES; k++) {
-        double w = 1.0;
-        for (int m = 0; m < BST_PATH_NODES; m++) {
-            w *= m == k ? 1.0 : (u * (BST_PATH_NODES - 1) - m) / (k - m);
-        }
-        sum = bst_vec3_axpy(sum, w, place[k]);
+        sum = bst_vec3_axpy(sum, q->weight[k], place[k]);
     }
     return sum;
 }
@@ -432,21 +444,23 @@ typedef struct instant {
 static instant instant_at(const bst_world_view *view, const bst_world_view_span *span, int object,
                           const bst_scene_source_path *path, const bst_scene_path_light *light,
                           double u) {
-    instant out = {.eye_m = quartic(light->eye_m, u),
-                   .bodies = {.sun_m = quartic(light->sun_m, u),
+    const quartic now = quartic_at(u);
+    instant out = {.eye_m = through(&now, light->eye_m),
+                   .bodies = {.sun_m = through(&now, light->sun_m),
                               .earth_bary_mps = light->earth_bary_mps,
                               .pole = light->pole}};
     double duration_s = span->end_s - span->start_s;
     out.at = (bst_view_emission){
         object,
-        bst_vec3_add(bst_vec3_add(out.eye_m, quartic(path->place, u)), light->lag_m),
+        bst_vec3_add(bst_vec3_add(out.eye_m, through(&now, path->place)), light->lag_m),
         {0, 0, 0},
         span->start_s + u * duration_s - light->light_time_s};
     if (view->world->objects[object].info.shape && duration_s > 0.0) {
         const double h =
             1e-2; /* the difference of a quartic: exact to h^2 of the third derivative */
-        bst_vec3 after = bst_vec3_add(quartic(light->eye_m, u + h), quartic(path->place, u + h));
-        bst_vec3 before = bst_vec3_add(quartic(light->eye_m, u - h), quartic(path->place, u - h));
+        const quartic next = quartic_at(u + h), last = quartic_at(u - h);
+        bst_vec3 after = bst_vec3_add(through(&next, light->eye_m), through(&next, path->place));
+        bst_vec3 before = bst_vec3_add(through(&last, light->eye_m), through(&last, path->place));
         out.at.velocity_mps =
             bst_vec3_scale(bst_vec3_sub(after, before), 1.0 / (2.0 * h * duration_s));
     }
