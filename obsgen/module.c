@@ -483,6 +483,8 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
     out->background_e = made.background_e;
     out->noise_e = made.noise_e;
     out->threshold_snr = made.threshold_snr;
+    bst_camera_motion_set_shared(made.shared_dx_px, made.shared_dy_px, made.shared_along_px2,
+                                 made.shared_across_px2, out);
     out->stars_identified = 0;
     out->count = made.count < capacity ? made.count : capacity;
     out->lost = made.lost + made.count - out->count;
