@@ -27,8 +27,9 @@ void bst_imgproc_set_shared_shift(const bst_imgproc *ip, const bst_camera_motion
         return;
     }
     double dx, dy, along, across;
-    bst_camera_motion_streak(corrected ? corrected : motion, &ip->camera, bst_camera_centre_x(&ip->camera),
-                             bst_camera_centre_y(&ip->camera), &dx, &dy);
+    bst_camera_motion_streak(corrected ? corrected : motion, &ip->camera,
+                             bst_camera_centre_x(&ip->camera), bst_camera_centre_y(&ip->camera),
+                             &dx, &dy);
     const double before = unknown_bend_px(ip, motion), length = hypot(dx, dy);
     const double after =
         corrected ? corrected->bend_sigma_rad / bst_camera_scale_rad(&ip->camera) : before;

@@ -222,8 +222,10 @@ void bst_camera_motion_shared_shift(double length_px, double sigma_px, double be
     double along = 0.0, across = 0.0, bend = 0.0, along2 = 0.0, across2 = 0.0;
     for (int k = 0; k <= SHIFT_STEPS; k++) {
         /* Simpson's rule; t from -1 to 1 over the exposure */
-        const double weight = (k == 0 || k == SHIFT_STEPS ? 1.0 : k % 2 ? 4.0 : 2.0) / 3.0 * 2.0 /
-                              SHIFT_STEPS;
+        const double weight = (k == 0 || k == SHIFT_STEPS ? 1.0
+                               : k % 2                    ? 4.0
+                                                          : 2.0) /
+                              3.0 * 2.0 / SHIFT_STEPS;
         const double t = 2.0 * k / SHIFT_STEPS - 1.0;
         const double from_end = half * (t - 1.0), from_start = half * (t + 1.0);
         const double a = from_start * density(from_start) - from_end * density(from_end);
@@ -239,8 +241,7 @@ void bst_camera_motion_shared_shift(double length_px, double sigma_px, double be
     const double all = 2.0 * along2 / (along * along) - 1.0;
     const double higher = fmax(all - 5.0 * bend * bend, 0.0) / 5.0;
     *along_px2 = higher * before_px * before_px + bend * bend * after_px * after_px;
-    *across_px2 =
-        fmax(2.0 * across2 / (across * across) - 1.0, 0.0) / 5.0 * before_px * before_px;
+    *across_px2 = fmax(2.0 * across2 / (across * across) - 1.0, 0.0) / 5.0 * before_px * before_px;
 }
 
 void bst_camera_motion_set_shared(double dx_px, double dy_px, double along_px2, double across_px2,

@@ -153,7 +153,8 @@ static bst_attitude_fix attitude_of(const bst_io_rows *rows) {
         .sigma_rad = {bst_io_rows_real(rows, SIGMA) * BST_ARCSEC_RAD,
                       bst_io_rows_real(rows, SIGMA + 1) * BST_ARCSEC_RAD,
                       bst_io_rows_real(rows, SIGMA + 2) * BST_ARCSEC_RAD},
-        .correlation = {bst_io_rows_real(rows, CORRELATION), bst_io_rows_real(rows, CORRELATION + 1),
+        .correlation = {bst_io_rows_real(rows, CORRELATION),
+                        bst_io_rows_real(rows, CORRELATION + 1),
                         bst_io_rows_real(rows, CORRELATION + 2)},
         .shared = bst_io_rows_real(rows, SHARED)};
 }
