@@ -197,10 +197,12 @@ void bst_camera_motion_add(bst_camera_motion *motion, const bst_camera *camera, 
         bst_vec3_add(motion->bend_cam_rad, rotation_of(camera, bend_x_px, bend_y_px));
 }
 
-/* Standard normal density and distribution. */
-static double density(double z) {
-    return exp(-0.5 * z * z) / 2.5066282746310002;
+/* Derivative of exp(-z^2 / 2), negative. */
+static double flank(double z) {
+    return z * exp(-0.5 * z * z);
 }
+
+/* Standard normal distribution. */
 static double below(double z) {
     return 0.5 * erfc(-z / 1.4142135623730951);
 }
@@ -228,7 +230,7 @@ void bst_camera_motion_shared_shift(double length_px, double sigma_px, double be
                               3.0 * 2.0 / SHIFT_STEPS;
         const double t = 2.0 * k / SHIFT_STEPS - 1.0;
         const double from_end = half * (t - 1.0), from_start = half * (t + 1.0);
-        const double a = from_start * density(from_start) - from_end * density(from_end);
+        const double a = flank(from_start) - flank(from_end);
         const double c = below(from_start) - below(from_end);
         along += weight * a;
         along2 += weight * a * a;
