@@ -193,10 +193,13 @@ static void tracks_update_their_objects(void **state) {
     cJSON *manifest = cJSON_CreateObject();
     bst_run_custody_add(c, manifest);
     const cJSON *node = cJSON_GetObjectItem(manifest, "custody");
-    const char *keys[] = {"objects",    "updated",        "in_custody",   "tracks",
-                          "correlated", "ambiguous",      "uncorrelated", "cross_tags",
-                          "age_mean_s", "sigma_median_m", "sigma_p90_m",  "sigma_updated_median_m",
-                          "nees_mean",  "nees_low",       "nees_high"};
+    const char *keys[] = {"objects",         "updated",     "in_custody",
+                          "tracks",          "correlated",  "ambiguous",
+                          "uncorrelated",    "cross_tags",  "age_mean_s",
+                          "sigma_median_m",  "sigma_p90_m", "sigma_updated_median_m",
+                          "nees_mean",       "nees_low",    "nees_high",
+                          "unknown",         "candidates",  "candidates_confirmed",
+                          "candidates_wrong"};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
         assert_true(cJSON_IsNumber(cJSON_GetObjectItem(node, keys[i])));
     }
