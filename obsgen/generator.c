@@ -555,7 +555,15 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
                                   .faint_light_e = g->faint_light_e,
                                   .faint_square_e2 = g->faint_square_e2,
                                   .streak_px = g->streak * g->binning,
-                                  .smeared = g->smeared};
+                                  .smeared = g->smeared,
+                                  .shared_dx_px = g->fit_path.dx,
+                                  .shared_dy_px = g->fit_path.dy};
+    if (g->streak > 0.0 && !g->smeared) {
+        bst_camera_motion_shared_shift(g->binning * hypot(g->fit_path.dx, g->fit_path.dy),
+                                       g->binning * g->total_sigma, g->binning * g->bend_before,
+                                       g->binning * g->bend_after, &out->shared_along_px2,
+                                       &out->shared_across_px2);
+    }
     return BST_OK;
 }
 

@@ -94,6 +94,9 @@ typedef struct bst_generator_result {
     double faint_light_e, faint_square_e2;
     double streak_px; /* streak length of the star filter; sensor px */
     bool smeared;     /* stars moved further than is filtered for */
+    /* displacement that all streaks of stars share: direction of the streaks, and variances along
+     * and across it, sensor px */
+    double shared_dx_px, shared_dy_px, shared_along_px2, shared_across_px2;
 } bst_generator_result;
 
 /* Generates the detections of a frame. Random draws depend only on key, exposure number and source

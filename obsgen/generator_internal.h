@@ -104,6 +104,8 @@ struct bst_generator {
     double bend_x, bend_y;
     bst_obsgen_path_px fit_path; /* of the streaks that are fitted, and its bend */
     double fit_bend_x, fit_bend_y;
+    double bend_before,
+        bend_after;           /* 1 sigma of the unknown bend without and with bright streaks */
     bst_star_trail_path path; /* true path; count 0: unknown */
     double *path_x, *path_y, *object_x, *object_y;
     int path_room;

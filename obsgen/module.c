@@ -457,19 +457,7 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
     bool oriented, locked;
     bst_camera_motion motion;
     set_attitude(o, step, e, &oriented, &locked, &motion, out);
-    bst_generator_frame frame = {
-        .truth = p->truth,
-        .ghost = p->ghost,
-        .window = e->window,
-        .binning = e->binning,
-        .exposure_s = (double)(e->end_tick - e->start_tick) / (double)o->tick_rate_hz,
-        .sigma_px = p->sigma_px,
-        .response = p->own_response ? &p->response : NULL,
-        .image_bound = p->own_response ? &p->image_bound : NULL,
-        .onboard_bound = p->own_response ? &p->onboard_bound : NULL,
-        .path_x_px = p->path_x_px,
-        .path_y_px = p->path_y_px,
-        .path_count = p->path_count};
+    bst_generator_frame frame = bst_obsgen_pending_frame(p, e, (double)o->tick_rate_hz);
     if (oriented) {
         const bst_camera *camera = bst_knowledge_camera(o->knowledge);
         bst_camera_motion_streak(&motion, camera, e->window.x0 + 0.5 * (e->window.width - 1),
@@ -483,6 +471,8 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
     out->background_e = made.background_e;
     out->noise_e = made.noise_e;
     out->threshold_snr = made.threshold_snr;
+    bst_camera_motion_set_shared(made.shared_dx_px, made.shared_dy_px, made.shared_along_px2,
+                                 made.shared_across_px2, out);
     out->stars_identified = 0;
     out->count = made.count < capacity ? made.count : capacity;
     out->lost = made.lost + made.count - out->count;

@@ -134,3 +134,19 @@ bst_status bst_obsgen_pending_archive(bst_obsgen_pending *p, int ghosts, bst_arc
     bst_archive_bytes(archive, p->path_y_px, (size_t)count * sizeof *p->path_y_px);
     return BST_OK;
 }
+
+bst_generator_frame bst_obsgen_pending_frame(const bst_obsgen_pending *p, const bst_exposure *e,
+                                             double tick_rate_hz) {
+    return (bst_generator_frame){.truth = p->truth,
+                                 .ghost = p->ghost,
+                                 .window = e->window,
+                                 .binning = e->binning,
+                                 .exposure_s = (double)(e->end_tick - e->start_tick) / tick_rate_hz,
+                                 .sigma_px = p->sigma_px,
+                                 .response = p->own_response ? &p->response : NULL,
+                                 .image_bound = p->own_response ? &p->image_bound : NULL,
+                                 .onboard_bound = p->own_response ? &p->onboard_bound : NULL,
+                                 .path_x_px = p->path_x_px,
+                                 .path_y_px = p->path_y_px,
+                                 .path_count = p->path_count};
+}

@@ -4,6 +4,7 @@
 
 #include "boresight/archive.h"
 #include "boresight/messages.h"
+#include "obsgen/generator.h"
 #include "obsgen/model/crlb_table.h"
 #include "obsgen/model/response.h"
 #include "sim/world/scene/los_track.h"
@@ -44,6 +45,11 @@ bst_status bst_obsgen_pending_reserve_path(bst_ctx *ctx, bst_obsgen_pending *pen
 bst_status bst_obsgen_pending_set_path(bst_ctx *ctx, bst_obsgen_pending *pending,
                                        const bst_camera *camera, const bst_los_track *track,
                                        double lead_s, bst_window window) BST_MUST_CHECK;
+
+/* Frame of the generator for a pending exposure, whose memory it lends; what telemetry says of the
+ * camera's motion is 0. */
+bst_generator_frame bst_obsgen_pending_frame(const bst_obsgen_pending *pending,
+                                             const bst_exposure *exposure, double tick_rate_hz);
 
 /* Saves or restores a pending exposure, for bst_module_desc.archive.
  *

@@ -6,7 +6,8 @@
 
 #include "control/tasking/tasking_internal.h"
 
-/* Largest urgency: time since the last observation over the wanted revisit time. */
+/* Largest urgency: time since the last observation over the wanted revisit time, or standard
+ * deviation over the wanted one. */
 #define URGENCY_MOST 4.0
 /* Most visibility computations per plan; remaining objects are left to the next plan. */
 enum { TRIES = 200 };
@@ -83,6 +84,7 @@ static size_t lay_out(bst_tasking *t) {
     size_t n = (size_t)t->object_count + 1, sensors = (size_t)t->sensor_count;
     BST_ARENA_TAKE(&t->arena, t->sensors, sensors);
     BST_ARENA_TAKE(&t->arena, t->line, n);
+    BST_ARENA_TAKE(&t->arena, t->along, n);
     BST_ARENA_TAKE(&t->arena, t->seen_s, n);
     BST_ARENA_TAKE(&t->arena, t->holder, n);
     BST_ARENA_TAKE(&t->arena, t->not_before, n * sensors);
@@ -111,6 +113,7 @@ bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *t, const bst_tasking_conf
         t->holder[i] = -1;
     }
     BST_TRY(take_members(ctx, t, members));
+    bst_tasking_uncertainty_init(t);
     return list_targets(ctx, t);
 }
 
@@ -138,6 +141,8 @@ static bst_status archive_sensor(bst_tasking *t, int sensor, bst_archive *archiv
     BST_ARCHIVE(archive, s->frames);
     BST_ARCHIVE(archive, s->frames_wanted);
     BST_ARCHIVE(archive, s->last_seen_s);
+    BST_ARCHIVE(archive, s->seen_direction);
+    BST_ARCHIVE(archive, s->seen_covariance);
     BST_ARCHIVE(archive, s->next_plan_s);
     BST_ARCHIVE(archive, s->quiet_until);
     if (bst_archive_is_restoring(archive) && s->nav_known) {
@@ -157,6 +162,7 @@ static bst_status archive_sensor(bst_tasking *t, int sensor, bst_archive *archiv
 /* `place_m` is the work space of a plan; `line` follows from the list. */
 bst_status bst_tasking_archive(bst_tasking *t, bst_archive *archive) {
     size_t objects = (size_t)t->object_count;
+    bst_archive_bytes(archive, t->along, objects * sizeof *t->along);
     bst_archive_bytes(archive, t->seen_s, objects * sizeof *t->seen_s);
     bst_archive_bytes(archive, t->holder, objects * sizeof *t->holder);
     bst_archive_bytes(archive, t->not_before,
@@ -181,6 +187,10 @@ void bst_tasking_tracks(bst_tasking *t, int sensor, const bst_tracks *tracks) {
             s->frames++;
             s->last_seen_s = seconds_of(t, tracks->tick);
             t->seen_s[s->task.object] = s->last_seen_s;
+            s->seen_direction = track->direction_gcrf;
+            for (int k = 0; k < 4; k++) {
+                s->seen_covariance[k / 2][k % 2] = track->covariance[k / 2][k % 2];
+            }
         }
     }
 }
@@ -205,7 +215,9 @@ static double urgency_of(const bst_tasking *t, int object, double now_s) {
     const bst_tasking_line *line = line_of(t, object);
     /* a target never observed is due from the start, with growing urgency */
     double since = t->seen_s[object] < 0.0 ? now_s + line->revisit_s : now_s - t->seen_s[object];
-    return since / line->revisit_s;
+    return line->sigma_m > 0.0 && since >= line->revisit_s
+               ? bst_tasking_sigma_m(t, object, now_s) / line->sigma_m
+               : since / line->revisit_s;
 }
 
 /* Value of a target after a slew. */
@@ -390,6 +402,7 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
             return BST_OK;
         }
         t->holder[s->task.object] = -1;
+        BST_TRY(bst_tasking_take_track(ctx, t, sensor));
         if (before != BST_TASK_DONE) {
             *not_before(t, sensor, s->task.object) = (float)(now_s + t->config.retry_s);
         }

@@ -7,7 +7,9 @@
  *
  *   priority * min(time since observation / revisit time, 4) / (slew + settling + frame time)
  *
- * that it can see from its arrival until the frames are taken. */
+ * that it can see from its arrival until the frames are taken. A line with sigma_m is due by
+ * uncertainty: if the standard deviation of the place along the orbit exceeds sigma_m too, and the
+ * urgency is the former over the latter. */
 #ifndef BST_CONTROL_TASKING_TASKING_H
 #define BST_CONTROL_TASKING_TASKING_H
 
@@ -24,6 +26,7 @@ typedef struct bst_tasking_line {
     double perigee_km[2], apogee_km[2]; /* altitudes over the equatorial radius */
     double priority;
     double revisit_s;
+    double sigma_m; /* wanted standard deviation of the place along the orbit; 0: any */
     int64_t frames;
 } bst_tasking_line;
 
@@ -34,6 +37,7 @@ typedef struct bst_tasking_config {
     double slew_rate_deg_per_s, settle_s;
     double find_timeout_s, retry_s, replan_interval_s;
     double sigma_deg, rate_sigma_arcsec_per_s, v_mag_sigma;
+    double catalogue_sigma_m, catalogue_drift_m_per_day, catalogue_noise_m_per_day;
     double report_every_s;
 } bst_tasking_config;
 
@@ -77,8 +81,16 @@ typedef struct bst_tasking_sensor {
     double given_s, arrival_s;     /* time of assignment; predicted time of arrival */
     int64_t frames, frames_wanted; /* frames with a detection */
     double last_seen_s, next_plan_s;
+    bst_vec3 seen_direction; /* of the target's track at last_seen_s, and its covariance */
+    double seen_covariance[2][2];
     int64_t quiet_until; /* lookahead: tick before which the task does not change */
 } bst_tasking_sensor;
+
+/* Covariance of an object's displacement along its orbit, which at t days is A + t D. */
+typedef struct bst_tasking_along {
+    double aa, ad, dd; /* m^2, m^2/day, m^2/day^2 */
+    double until_days; /* process noise is in it until this time */
+} bst_tasking_along;
 
 typedef struct bst_tasking_choice {
     int object;
@@ -92,12 +104,13 @@ typedef struct bst_tasking {
     bst_tasking_sensor *sensors;
     int sensor_count;
     int object_count;
-    int16_t *line;      /* [object] of config.targets, -1: none */
-    double *seen_s;     /* [object] time of the latest sighting; below 0: none */
-    int *holder;        /* [object] index of the sensor whose task it is, -1: none */
-    float *not_before;  /* [sensor][object] s: earliest time of the next attempt */
-    double places_s;    /* time of place_m; NAN: none */
-    double *place_m[3]; /* [object] */
+    int16_t *line;            /* [object] of config.targets, -1: none */
+    bst_tasking_along *along; /* [object] */
+    double *seen_s;           /* [object] time of the latest sighting; below 0: none */
+    int *holder;              /* [object] index of the sensor whose task it is, -1: none */
+    float *not_before;        /* [sensor][object] s: earliest time of the next attempt */
+    double places_s;          /* time of place_m; NAN: none */
+    double *place_m[3];       /* [object] */
     double next_report_s;
 } bst_tasking;
 

@@ -10,6 +10,9 @@ static const bst_config_desc line_table[] = {
     BST_REAL(L, priority, "", 0, 1e6, "1", "What a target counts against others; 0: leave it out."),
     BST_REAL(L, revisit_s, "s", 1, 1e9, "3600",
              "It is to be seen again after this time: it is due then."),
+    BST_REAL(L, sigma_m, "m", 0, 1e9, "0",
+             "Above 0: it is due when the standard deviation of its place along the orbit exceeds "
+             "this too; the more, the more urgent."),
     BST_INT(L, frames, "frames", 1, 1000000, "15", "Frames in which it is to be seen each time."),
     BST_CONFIG_END};
 #undef L
@@ -41,6 +44,13 @@ const bst_config_desc bst_tasking_config_table[] = {
     BST_REAL(T, sigma_deg, "deg", 1e-6, 90, "0.05", "Error of the cues, 1 sigma per axis."),
     BST_REAL(T, rate_sigma_arcsec_per_s, "arcsec/s", 1e-6, 1e5, "0.5", "The same of their rates."),
     BST_REAL(T, v_mag_sigma, "mag", 0.01, 100, "1", "The same of their brightness."),
+    BST_REAL(T, catalogue_sigma_m, "m", 1e-3, 1e9, "500",
+             "For targets with sigma_m: standard deviation of the catalogue's places at the epoch "
+             "of the elements."),
+    BST_REAL(T, catalogue_drift_m_per_day, "m/day", 1e-3, 1e9, "1500",
+             "Growth of this along the orbit in a day, 1 sigma."),
+    BST_REAL(T, catalogue_noise_m_per_day, "m/day", 0, 1e9, "0",
+             "Standard deviation of the drift gained in a day, as a random walk."),
     BST_REAL(T, report_every_s, "s", 0, 1e9, "3600",
              "An event says this often what no sensor can see, and why; 0: never."),
     BST_CONFIG_END};

@@ -19,11 +19,6 @@
 
 /* Least share of the detection threshold from which maxima are interpolated between pixels. */
 static const double LOOK_SHARE = 0.65;
-/* RMS bend, px, of the stars' path per px RMS of jitter whose spectrum is flat from 2.5 to 100
- * cycles per exposure. */
-static const double JITTER_BEND = 0.075;
-/* Drift of the camera unknown to the telemetry, px per exposure. */
-static const double DRIFT_PX = 1.0;
 /* SNR above which pixels of a crowded frame are masked as stars. It is low because a crowd raises
  * the noise estimate. */
 static const float STAR_SNR = 3.0f;
@@ -419,14 +414,6 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
     *out = (part){threshold, false_alarms, search};
 }
 
-/* Corrects the camera motion by the star streaks added to ip->streak_motion. */
-static void correct_motion(bst_imgproc *ip, double binning, bst_camera_motion *motion) {
-    double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
-                           motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
-    (void)bst_streak_motion_solve(&ip->streak_motion, &ip->locator.psf, &ip->locator.profiles,
-                                  &ip->camera, DRIFT_PX / binning, bend_px / binning, motion);
-}
-
 /* Locates a part's candidates and appends the detections to `out`. */
 static void locate_candidates(bst_imgproc *ip, const part *p, bst_detections *out, int capacity) {
     if (ip->smeared) {
@@ -467,6 +454,7 @@ static void measure_columns(bst_imgproc *ip, bst_parallel *pool, const bst_imgpr
 
 static void empty(bst_detections *out) {
     out->background_e = out->noise_e = out->threshold_snr = 0.0;
+    out->shared_xx = out->shared_xy = out->shared_yy = 0.0;
     out->stars_identified = 0;
     out->count = 0;
     out->lost = 0;
@@ -483,14 +471,16 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     measure_columns(ip, alone ? NULL : ip->pool, frame);
     ip->windowed = false;
     find_candidates(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
-    if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &ip->view)) {
+    const bool measured = !ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &ip->view);
+    if (measured) {
         bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
-        correct_motion(ip, frame->binning, &ip->motion);
+        bst_imgproc_correct_motion(ip, frame->binning, &ip->motion);
     }
     bst_imgproc_begin_shows(ip);
     bst_imgproc_add_shows(ip, frame, frame);
     bst_pixel_shows_sort(&ip->shows);
     locate_candidates(ip, &whole, out, capacity);
+    bst_imgproc_set_shared_shift(ip, motion, measured ? &ip->motion : NULL, out);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
     return BST_OK;
@@ -522,14 +512,16 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
     assert(windows->count >= 0 && (windows->items || windows->count == 0));
     BST_TRY(check_frame(ctx, ip, frame));
     double pixels = 0.0;
+    bool measured = false;
     bst_camera_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     empty(out);
     measure_columns(ip, ip->pool, frame);
     ip->windowed = true;
     if (motion) {
         used = *motion;
-        if (measure_in_windows(ip, frame, windows, motion)) {
-            correct_motion(ip, frame->binning, &used);
+        measured = measure_in_windows(ip, frame, windows, motion);
+        if (measured) {
+            bst_imgproc_correct_motion(ip, frame->binning, &used);
         }
     }
     bst_imgproc_begin_shows(ip);
@@ -546,6 +538,7 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
         out->noise_e += n * (double)ip->background.median_noise;
     }
     bst_pixel_shows_sort(&ip->shows);
+    bst_imgproc_set_shared_shift(ip, motion, measured ? &used : NULL, out);
     if (pixels > 0.0) {
         out->background_e /= pixels;
         out->noise_e /= pixels;

@@ -58,6 +58,15 @@ const uint8_t *bst_imgproc_find_silhouettes(bst_imgproc *ip, const bst_imgproc_f
                                             const bst_camera_motion *motion, double sigma_px,
                                             int saturated_dn);
 
+/* Corrects the camera motion by the star streaks that ip->streak_motion has. */
+void bst_imgproc_correct_motion(bst_imgproc *ip, double binning, bst_camera_motion *motion);
+/* Sets the covariance of the displacement that all star streaks of a frame share.
+ *
+ * Given:     motion     by telemetry; NULL: unknown, and nothing is set
+ *            corrected  by streaks; NULL: they were not measured */
+void bst_imgproc_set_shared_shift(const bst_imgproc *ip, const bst_camera_motion *motion,
+                                  const bst_camera_motion *corrected, bst_detections *out);
+
 /* Clears the bad-pixel evidence (ip->shows) before a frame. */
 void bst_imgproc_begin_shows(bst_imgproc *ip);
 /* Adds the bad-pixel evidence of a searched frame, or of a window of it. */

@@ -244,10 +244,10 @@ static bool step_star(star *s, const double by[COMMON], double ex, double ey) {
            isfinite(s->flux_e) && isfinite(s->product_e);
 }
 
-/* Joint motion step of all stars and the priors. */
+/* Joint motion step of all stars and the priors; bend_px2: variance of the bend that is left. */
 static bool solve_motion(const star *stars, int count, const double sigma[COMMON],
-                         const double away[COMMON], double step[COMMON]) {
-    double a[LOCAL][LOCAL] = {{0}}, x[1][LOCAL] = {{0}};
+                         const double away[COMMON], double step[COMMON], double *bend_px2) {
+    double a[LOCAL][LOCAL] = {{0}}, x[2][LOCAL] = {{0}, {[COMMON - 1] = 1.0}};
     for (int k = 0; k < COMMON; k++) {
         double prior = 1.0 / (sigma[k] * sigma[k]);
         a[k][k] = prior;
@@ -261,12 +261,13 @@ static bool solve_motion(const star *stars, int count, const double sigma[COMMON
             }
         }
     }
-    if (!solve(COMMON, a, 1, x)) {
+    if (!solve(COMMON, a, 2, x)) {
         return false;
     }
     for (int k = 0; k < COMMON; k++) {
         step[k] = x[0][k];
     }
+    *bend_px2 = x[1][COMMON - 1];
     return isfinite(step[0]) && isfinite(step[1]) && isfinite(step[2]);
 }
 
@@ -339,19 +340,19 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *p
     const double least = 1e-4;
     const double sigma[COMMON] = {fmax(length_px, least), fmax(length_px, least),
                                   fmax(bend_px, least)};
-    double away[COMMON] = {0};
+    double away[COMMON] = {0}, bend_px2 = 0.0;
     for (int round = 0; round < ROUNDS; round++) {
         double step[COMMON] = {0};
         for (int i = 0; i < count; i++) {
             bst_source_profiles_on(profiles, stars[i].origin_x_px, stars[i].origin_y_px, (int)b);
             stars[i].used = stars[i].used && accumulate_star(work, psf, profiles, &stars[i]);
         }
-        if (!solve_motion(stars, count, sigma, away, step)) {
+        if (!solve_motion(stars, count, sigma, away, step, &bend_px2)) {
             return false;
         }
         if (round == ROUNDS - 2) {
             reject_outliers(stars, count, step);
-            if (!solve_motion(stars, count, sigma, away, step)) {
+            if (!solve_motion(stars, count, sigma, away, step, &bend_px2)) {
                 return false;
             }
         }
@@ -374,5 +375,6 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *p
     }
     bst_camera_motion_add(motion, camera, b * (away[0] * ex - away[1] * ey),
                           b * (away[0] * ey + away[1] * ex), b * away[2] * ex, b * away[2] * ey);
+    motion->bend_sigma_rad = b * sqrt(bend_px2) * bst_camera_scale_rad(camera);
     return true;
 }

@@ -53,7 +53,7 @@ void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *fram
  *                       path, frame px
  *            bend_px    1 sigma prior of the error of its bend, frame px
  *            *motion    copy of frame->motion
- * Returned:  *motion    corrected
+ * Returned:  *motion    corrected; its bend_sigma_rad is that of the bend along the streaks
  *            false, with *motion unchanged, if no streak was bright enough */
 bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *psf,
                              bst_source_profiles *profiles, const bst_camera *camera,

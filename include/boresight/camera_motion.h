@@ -32,8 +32,12 @@ typedef struct bst_camera_motion {
  *            variance of the samples' noise is estimated from third differences, which smooth
  *            motion does not affect. The bend about x and y is then multiplied by 1 - 2 s^2 /
  *            bend^2 (0 if negative), s being the standard deviation that this noise gives the bend.
+ *            bend_sigma_rad is the root of that share of s^2, of a third at least: a bend that
+ *            noise hides is unknown, not zero.
  *            An exposure of length zero gives the attitude at that time, no turn and no bend.
- * Reference: James and Stein 1961 (positive-part shrinkage) */
+ * Reference: James and Stein 1961 (positive-part shrinkage); Strawderman, Annals of Mathematical
+ *            Statistics 42, 385, 1971: with a uniform prior of the shrinkage, a third of s^2 is
+ *            left where the measured bend is 0 */
 bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
                                       int64_t end_tick, bst_camera_motion *out);
 
@@ -69,6 +73,27 @@ void bst_camera_motion_widen(double bend_x_px, double bend_y_px, double followed
  *            bend_x_px, bend_y_px  bend to add, px */
 void bst_camera_motion_add(bst_camera_motion *motion, const bst_camera *camera, double dx_px,
                            double dy_px, double bend_x_px, double bend_y_px);
+
+/* Variance of the displacement that all star streaks of a frame share, because the motion of the
+ * camera departs from the one that is fitted.
+ *
+ * Given:     length_px      of the streaks
+ *            sigma_px       of the PSF with the pixel
+ *            before_px      1 sigma per axis of the bend before it is measured on streaks
+ *            after_px       1 sigma of the bend along the streaks that is left
+ * Returned:  along_px2, across_px2
+ * Notes:     the positions are to be the mean of the path. A fit of a uniform streak weighs the
+ *            path along itself by what its two ends show, across it by the light that its profile
+ *            catches. The departure has a flat spectrum: its Legendre coefficients of even degree n
+ *            have variances in proportion to 2 n + 1, and that of degree 2 is the bend.
+ * Reference: docs/explanation/equations/image_processing.md, "Motion of the stars" */
+void bst_camera_motion_shared_shift(double length_px, double sigma_px, double before_px,
+                                    double after_px, double *along_px2, double *across_px2);
+
+/* Sets the shared_xx, shared_xy and shared_yy of detections from variances along and across streaks
+ * of direction (dx_px, dy_px). */
+void bst_camera_motion_set_shared(double dx_px, double dy_px, double along_px2, double across_px2,
+                                  bst_detections *detections);
 
 #pragma GCC visibility pop
 

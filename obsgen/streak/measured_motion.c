@@ -70,6 +70,8 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
     g->fit_path = g->star_path;
     g->fit_bend_x = g->bend_x;
     g->fit_bend_y = g->bend_y;
+    double prior = hypot(JITTER_BEND * g->settings.jitter_px, f->bend_sigma_px) / g->binning;
+    g->bend_before = g->bend_after = prior;
     double snr2 = snr2_of_stars(g, f->truth), length = g->streak;
     if (g->smeared || g->path.count < 3 || !(length >= LEAST_PATH_SIGMAS * g->fitted_sigma) ||
         hypot(g->bend_x, g->bend_y) > MOST_BEND * length || !(snr2 > 0.0)) {
@@ -80,9 +82,9 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
     double reported = g->bend_x * c + g->bend_y * s; /* by telemetry */
     /* The bend shows as a slope of the light along the streak, 6 bend / length from end to middle:
      * its mean square is 12 (bend / length)^2 of the squared SNR. The ends give the length. */
-    double prior = hypot(JITTER_BEND * g->settings.jitter_px, f->bend_sigma_px) / g->binning;
     double error2 = length * length / (12.0 * snr2);
     double share = prior * prior / (prior * prior + error2);
+    g->bend_after = sqrt(share * error2);
     double ends2 = 8.0 * g->total_sigma * length / snr2, drift = DRIFT_PX / g->binning;
     double whole = drift * drift / (drift * drift + ends2);
     double noise =

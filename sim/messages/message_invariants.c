@@ -117,7 +117,8 @@ bool bst_detections_are_valid(const bst_detections *d, int capacity) {
     bool valid = is_count(d->count, d->lost, capacity) && d->start_tick <= d->end_tick &&
                  is_attitude(d->q_cam_from_gcrf) && is_attitude(d->q_telemetry_from_gcrf) &&
                  d->stars_identified >= 0 && d->windows >= 0 && d->bad_pixels >= 0 &&
-                 is_calibration(&d->calibration);
+                 bst_is_variance(d->shared_xx) && bst_is_variance(d->shared_yy) &&
+                 isfinite(d->shared_xy) && is_calibration(&d->calibration);
     for (int i = 0; valid && i < d->count; i++) {
         valid = is_detection(&d->items[i]);
     }
@@ -135,10 +136,11 @@ static bool is_track(const bst_track *t) {
 bool bst_tracks_are_valid(const bst_tracks *t, int capacity) {
     bool valid = is_count(t->count, t->lost, capacity) && t->target_id >= 0 && t->at_rest >= 0;
     if (t->attitude.valid) {
-        const double *sigma = t->attitude.sigma_rad;
+        const double *sigma = t->attitude.sigma_rad, *c = t->attitude.correlation;
         valid = valid && is_attitude(t->attitude.q_cam_from_gcrf) && t->attitude.stars >= 0 &&
                 bst_is_variance(sigma[0]) && bst_is_variance(sigma[1]) &&
-                bst_is_variance(sigma[2]) && bst_is_share(t->attitude.shared);
+                bst_is_variance(sigma[2]) && bst_is_share(t->attitude.shared) &&
+                fabs(c[0]) <= 1.0 && fabs(c[1]) <= 1.0 && fabs(c[2]) <= 1.0;
     }
     for (int i = 0; valid && i < t->count; i++) {
         valid = is_track(&t->items[i]);

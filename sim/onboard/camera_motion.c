@@ -55,6 +55,9 @@ static void add_sample(roughness *s, double step, bst_vec3 r) {
 /* minimum number of third differences for a noise estimate */
 enum { FEWEST_DIFFERENCES = 5 };
 
+/* Share of the noise's variance that is left of a bend where none is measured. */
+#define LEAST_UNKNOWN (1.0 / 3.0)
+
 /* Shrinks the estimated curvature of the motion by its noise. */
 static void judge_bend(const roughness *s, double samples, bst_camera_motion *motion) {
     if (s->count < FEWEST_DIFFERENCES) {
@@ -66,7 +69,7 @@ static void judge_bend(const roughness *s, double samples, bst_camera_motion *mo
     double square = b.x * b.x + b.y * b.y;
     double share = square > 2.0 * variance ? 1.0 - 2.0 * variance / square : 0.0;
     motion->bend_cam_rad = (bst_vec3){share * b.x, share * b.y, b.z};
-    motion->bend_sigma_rad = sqrt(share * variance);
+    motion->bend_sigma_rad = sqrt(fmax(share, LEAST_UNKNOWN) * variance);
 }
 
 bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
@@ -192,4 +195,62 @@ void bst_camera_motion_add(bst_camera_motion *motion, const bst_camera *camera, 
     motion->turn_cam_rad = bst_vec3_add(motion->turn_cam_rad, rotation_of(camera, dx_px, dy_px));
     motion->bend_cam_rad =
         bst_vec3_add(motion->bend_cam_rad, rotation_of(camera, bend_x_px, bend_y_px));
+}
+
+/* Derivative of exp(-z^2 / 2), negative. */
+static double flank(double z) {
+    return z * exp(-0.5 * z * z);
+}
+
+/* Standard normal distribution. */
+static double below(double z) {
+    return 0.5 * erfc(-z / 1.4142135623730951);
+}
+
+/* steps of the integrals over the exposure: 0.2 % for streaks of 200 sigma */
+enum { SHIFT_STEPS = 512 };
+/* A shorter streak, in sigmas of the PSF, is located as a point: at its centroid, the path's mean.
+ */
+static const double LEAST_STREAK_SIGMAS = 0.5;
+
+void bst_camera_motion_shared_shift(double length_px, double sigma_px, double before_px,
+                                    double after_px, double *along_px2, double *across_px2) {
+    *along_px2 = *across_px2 = 0.0;
+    if (!(length_px > LEAST_STREAK_SIGMAS * sigma_px)) {
+        return;
+    }
+    /* the overlap of two equal streaks has the variance of both profiles */
+    const double half = 0.5 * length_px / (sigma_px * sqrt(2.0));
+    double along = 0.0, across = 0.0, bend = 0.0, along2 = 0.0, across2 = 0.0;
+    for (int k = 0; k <= SHIFT_STEPS; k++) {
+        /* Simpson's rule; t from -1 to 1 over the exposure */
+        const double weight = (k == 0 || k == SHIFT_STEPS ? 1.0
+                               : k % 2                    ? 4.0
+                                                          : 2.0) /
+                              3.0 * 2.0 / SHIFT_STEPS;
+        const double t = 2.0 * k / SHIFT_STEPS - 1.0;
+        const double from_end = half * (t - 1.0), from_start = half * (t + 1.0);
+        const double a = flank(from_start) - flank(from_end);
+        const double c = below(from_start) - below(from_end);
+        along += weight * a;
+        along2 += weight * a * a;
+        bend += weight * a * (1.5 * t * t - 0.5);
+        across += weight * c;
+        across2 += weight * c * c;
+    }
+    bend /= along;
+    /* sum over even n of (2 n + 1) k_n^2 = 2 (mean of the squared weight), n = 0 has k = 1 */
+    const double all = 2.0 * along2 / (along * along) - 1.0;
+    const double higher = fmax(all - 5.0 * bend * bend, 0.0) / 5.0;
+    *along_px2 = higher * before_px * before_px + bend * bend * after_px * after_px;
+    *across_px2 = fmax(2.0 * across2 / (across * across) - 1.0, 0.0) / 5.0 * before_px * before_px;
+}
+
+void bst_camera_motion_set_shared(double dx_px, double dy_px, double along_px2, double across_px2,
+                                  bst_detections *detections) {
+    const double length = hypot(dx_px, dy_px);
+    const double c = length > 0.0 ? dx_px / length : 1.0, s = length > 0.0 ? dy_px / length : 0.0;
+    detections->shared_xx = c * c * along_px2 + s * s * across_px2;
+    detections->shared_xy = c * s * (along_px2 - across_px2);
+    detections->shared_yy = s * s * along_px2 + c * c * across_px2;
 }

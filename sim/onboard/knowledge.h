@@ -116,6 +116,8 @@ bool bst_knowledge_is_itself(const bst_knowledge *knowledge, int object);
  * at that time. */
 bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee_m,
                            double *apogee_m);
+/* Age of an object's element set at the scenario's epoch, s; false: it has none. */
+bool bst_knowledge_element_age(const bst_knowledge *knowledge, int object, double *seconds);
 /* Geocentric positions (GCRF) of all objects within 4 s of `seconds`, accurate to 1 km, for a
  * preselection. Returns their time, a multiple of 8 s. NAN: compute it directly; 0, 0, 0: no
  * orbit. */

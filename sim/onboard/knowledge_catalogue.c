@@ -43,6 +43,10 @@ bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee
     return true;
 }
 
+bool bst_knowledge_element_age(const bst_knowledge *k, int object, double *seconds) {
+    return bst_world_element_age(k->world, object, seconds);
+}
+
 double bst_knowledge_places(const bst_knowledge *k, double seconds, double *x_m, double *y_m,
                             double *z_m) {
     double t = bst_ephemeris_places(k->world->ephemeris, seconds, x_m, y_m, z_m);

@@ -11,6 +11,7 @@
 #include "sim/core/json_number.h"
 #include "sim/eval/consistency.h"
 #include "sim/run/run_arcs.h"
+#include "sim/run/run_candidates.h"
 #include "sim/run/run_summary.h"
 #include "tracker/orbit/custody.h"
 
@@ -53,6 +54,7 @@ struct bst_run_custody {
     score *scores;
     double *place_m[3]; /* [object] */
     bst_run_arcs *arcs;
+    bst_run_candidates *candidates;
     bst_io_table *tracks, *objects;
     bst_custody_figures figures;
 };
@@ -116,6 +118,9 @@ static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
     return BST_OK;
 }
 
+/* number of the draw that decides whether an object is unknown; the first ones are its errors */
+enum { UNKNOWN_DRAW = 1000 };
+
 /* Starts the filter of each object on an element set, with an error drawn from its covariance: by
  * catalogue number, or by name where that is 0, so that other objects do not change it. */
 static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, const bst_scenario *scenario) {
@@ -129,6 +134,13 @@ static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, const bst_scen
             continue;
         }
         const bst_world_object_info *info = bst_world_object(c->world, i);
+        const bst_rng_key key =
+            info->norad > 0 ? by_number : bst_rng_make_key(seed, run, "custody", info->name);
+        if (bst_rng_uniform(key, (uint64_t)info->norad, UNKNOWN_DRAW) <
+            scenario->record.custody_unknown_share) {
+            c->figures.unknown++;
+            continue;
+        }
         /* half the radius of a sphere as large as the object is catalogued */
         double photocentre_m = 0.5 * sqrt(info->area_m2 / BST_PI);
         bst_status status =
@@ -136,8 +148,6 @@ static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, const bst_scen
         if (status != BST_OK) {
             return bst_fail_prefix(ctx, status, "/record/custody");
         }
-        const bst_rng_key key =
-            info->norad > 0 ? by_number : bst_rng_make_key(seed, run, "custody", info->name);
         for (int k = 0; k < BST_CUSTODY_STATE; k++) {
             normals[k] = bst_rng_normal(key, (uint64_t)info->norad, (uint64_t)k);
         }
@@ -195,6 +205,8 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
     status = status == BST_OK
                  ? bst_run_arcs_create(ctx, world, (double)scenario->tick_rate_hz, &c->arcs)
                  : status;
+    status =
+        status == BST_OK ? bst_run_candidates_create(ctx, world, store, &c->candidates) : status;
     status = status == BST_OK && store ? make_tables(ctx, c, store) : status;
     if (status != BST_OK) {
         bst_run_custody_free(c);
@@ -208,6 +220,7 @@ void bst_run_custody_free(bst_run_custody *c) {
     if (c) {
         bst_world_view_free(c->view);
         bst_run_arcs_free(c->arcs);
+        bst_run_candidates_free(c->candidates);
         free(c->pixel_rad);
         free(c->orbits);
         free(c->filters);
@@ -257,6 +270,7 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
         archive_object(c, i, archive);
     }
     BST_TRY(bst_run_arcs_archive(c->arcs, archive));
+    BST_TRY(bst_run_candidates_archive(c->candidates, archive));
     BST_ARCHIVE(archive, c->figures);
     return BST_OK;
 }
@@ -384,6 +398,9 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
         s->last_s = isnan(s->last_s) ? z->observer.time_s : fmax(s->last_s, z->observer.time_s);
         nees = bst_custody_nees(&c->filters[m.best]);
     }
+    if (m.best < 0) {
+        BST_TRY(bst_run_candidates_take(ctx, c->candidates, sensor, arc, m.true_object));
+    }
     if (!c->tracks) {
         return BST_OK;
     }
@@ -463,6 +480,10 @@ bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s
     int count = 0, updated_count = 0, nees_count = 0;
     double age_sum = 0.0, nees_sum = 0.0;
     bst_custody_figures *f = &c->figures;
+    const bst_candidate_figures made = bst_run_candidates_figures(c->candidates);
+    f->candidates = made.candidates;
+    f->candidates_confirmed = made.confirmed;
+    f->candidates_wrong = made.wrong;
     f->in_custody = f->updated = 0;
     for (int i = 0; i < c->object_count; i++) {
         double sigma, nees;
@@ -514,6 +535,10 @@ void bst_run_custody_add(const bst_run_custody *c, cJSON *manifest) {
     cJSON_AddNumberToObject(node, "ambiguous", (double)f->ambiguous);
     cJSON_AddNumberToObject(node, "uncorrelated", (double)f->uncorrelated);
     cJSON_AddNumberToObject(node, "cross_tags", (double)f->cross_tags);
+    cJSON_AddNumberToObject(node, "unknown", (double)f->unknown);
+    cJSON_AddNumberToObject(node, "candidates", (double)f->candidates);
+    cJSON_AddNumberToObject(node, "candidates_confirmed", (double)f->candidates_confirmed);
+    cJSON_AddNumberToObject(node, "candidates_wrong", (double)f->candidates_wrong);
     bst_json_add_number(node, "age_mean_s", f->age_mean_s);
     bst_json_add_number(node, "sigma_median_m", f->sigma_median_m);
     bst_json_add_number(node, "sigma_p90_m", f->sigma_p90_m);
@@ -537,6 +562,9 @@ void bst_run_custody_print(const bst_run_custody *c) {
     bst_run_print_row("ambiguous", "%.0f", (double)f->ambiguous, "");
     bst_run_print_row("uncorrelated", "%.0f", (double)f->uncorrelated, "");
     bst_run_print_row("cross-tags", "%.0f", (double)f->cross_tags, "");
+    bst_run_print_row("candidate objects", "%.0f", (double)f->candidates, "of two tracks or more");
+    bst_run_print_row("of three or more", "%.0f", (double)f->candidates_confirmed, "");
+    bst_run_print_row("with wrong tracks", "%.0f", (double)f->candidates_wrong, "");
     bst_run_print_row("mean age", "%.0f", f->age_mean_s, "s");
     bst_run_print_row("median uncertainty", "%.0f", f->sigma_median_m, "m");
     bst_run_print_row("of updated objects", "%.0f", f->sigma_updated_median_m, "m");

@@ -24,8 +24,10 @@ typedef struct bst_custody_figures {
     int64_t correlated;   /* with an object */
     int64_t ambiguous;    /* with more than one object: not used */
     int64_t uncorrelated; /* with none, or the filter has no state there */
-    int64_t cross_tags;   /* correlated with another object than that of the truth */
-    double age_mean_s;    /* since the last update, of updated objects; NAN: none */
+    int64_t unknown;      /* objects that the catalogue lacks, by record/custody_unknown_share */
+    int64_t candidates, candidates_confirmed, candidates_wrong; /* bst_candidate_figures */
+    int64_t cross_tags;                 /* correlated with another object than that of the truth */
+    double age_mean_s;                  /* since the last update, of updated objects; NAN: none */
     double sigma_median_m, sigma_p90_m; /* of the position at the end, of all objects */
     double sigma_updated_median_m;      /* of updated objects; NAN: none */
     double nees_mean;                   /* of updated objects at the end; NAN: none */

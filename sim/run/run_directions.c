@@ -20,10 +20,15 @@ void bst_run_measure_direction(const bst_camera *camera, double x_px, double y_p
                               bst_camera_unproject(camera, x_px - 0.5, y_px));
     columns[1] = bst_vec3_sub(bst_camera_unproject(camera, x_px, y_px + 0.5),
                               bst_camera_unproject(camera, x_px, y_px - 0.5));
+    const double *sigma = attitude->sigma_rad;
     double c[5][5] = {{cov_px2[0], cov_px2[1]}, {cov_px2[1], cov_px2[2]}};
     for (int i = 0; i < 3; i++) {
         columns[2 + i] = bst_vec3_cross(unit[i], v);
-        c[2 + i][2 + i] = attitude->sigma_rad[i] * attitude->sigma_rad[i];
+        c[2 + i][2 + i] = sigma[i] * sigma[i];
+    }
+    for (int i = 0; i < 3; i++) { /* xy, xz, yz */
+        const int a = i / 2, b = i < 1 ? 1 : 2;
+        c[2 + a][2 + b] = c[2 + b][2 + a] = attitude->correlation[i] * sigma[a] * sigma[b];
     }
     out->direction = bst_light_unaberrate(light, bst_quat_rotate(back, v));
     const bst_tangent axes = bst_tangent_at(out->direction);
@@ -33,9 +38,11 @@ void bst_run_measure_direction(const bst_camera *camera, double x_px, double y_p
         j[0][i] = bst_vec3_dot(column, axes.e1);
         j[1][i] = bst_vec3_dot(column, axes.e2);
     }
-    for (int axis = 0; axis < 2; axis++) {
-        out->shared_rad[0][axis] = j[0][2 + axis] * attitude->sigma_rad[axis];
-        out->shared_rad[1][axis] = j[1][2 + axis] * attitude->sigma_rad[axis];
+    /* columns of a root of the covariance about x and y */
+    const double r = attitude->correlation[0], rest = sqrt(fmax(1.0 - r * r, 0.0));
+    for (int k = 0; k < 2; k++) {
+        out->shared_rad[k][0] = j[k][2] * sigma[0] + j[k][3] * r * sigma[1];
+        out->shared_rad[k][1] = j[k][3] * rest * sigma[1];
     }
     out->cov_11 = out->cov_12 = out->cov_22 = 0.0;
     for (int i = 0; i < 5; i++) {

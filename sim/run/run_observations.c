@@ -98,7 +98,8 @@ static const char query[] =
     " t.cov_d1_d1_rad2, t.cov_d1_d2_rad2, t.cov_d2_d2_rad2, f.attitude_valid,"
     " f.attitude_q_cam_from_gcrf_x, f.attitude_q_cam_from_gcrf_y, f.attitude_q_cam_from_gcrf_z,"
     " f.attitude_q_cam_from_gcrf_w, f.attitude_sigma_x_arcsec, f.attitude_sigma_y_arcsec,"
-    " f.attitude_sigma_z_arcsec, f.attitude_shared, t.x_px, t.y_px, d.cov_xx_px2, d.cov_xy_px2, "
+    " f.attitude_sigma_z_arcsec, f.attitude_correlation_xy, f.attitude_correlation_xz,"
+    " f.attitude_correlation_yz, f.attitude_shared, t.x_px, t.y_px, d.cov_xx_px2, d.cov_xy_px2, "
     "d.cov_yy_px2,"
     " g.end_tick - g.start_tick"
     " FROM tracks t JOIN track_frames f ON f.sensor = t.sensor AND f.exposure_id = t.exposure_id"
@@ -122,7 +123,8 @@ enum {
     VALID = COV_D + 3,
     ATTITUDE,
     SIGMA = ATTITUDE + 4,
-    SHARED = SIGMA + 3,
+    CORRELATION = SIGMA + 3,
+    SHARED = CORRELATION + 3,
     X_PX,
     Y_PX,
     COV_PX,
@@ -151,6 +153,9 @@ static bst_attitude_fix attitude_of(const bst_io_rows *rows) {
         .sigma_rad = {bst_io_rows_real(rows, SIGMA) * BST_ARCSEC_RAD,
                       bst_io_rows_real(rows, SIGMA + 1) * BST_ARCSEC_RAD,
                       bst_io_rows_real(rows, SIGMA + 2) * BST_ARCSEC_RAD},
+        .correlation = {bst_io_rows_real(rows, CORRELATION),
+                        bst_io_rows_real(rows, CORRELATION + 1),
+                        bst_io_rows_real(rows, CORRELATION + 2)},
         .shared = bst_io_rows_real(rows, SHARED)};
 }
 

@@ -87,5 +87,50 @@ class Attitude(unittest.TestCase):
         self.assertGreater(np.mean(chi2) / 2, 0.3)
 
 
+class SharedDisplacement(unittest.TestCase):
+    """Images and generator state the same displacement that all streaks of a frame share, and the
+    attitude has it: along the streaks more than across them."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = runs.scratch()
+        cls.out = {name: os.path.join(folder, name) for name in ("image", "generator")}
+        runs.parallel(lambda name: runs.run(
+            runs.TRACK, cls.out[name], runs.NO_FRAMES, "/record/truth_stars=true",
+            f"{runs.SENSOR}/observation_source={name}", duration=30), cls.out)
+
+    @classmethod
+    def tearDownClass(cls):
+        runs.clean()
+
+    def rows(self, name, columns):
+        return np.array(runs.database(self.out[name]).execute(
+            f"SELECT {columns} FROM detection_frames JOIN track_frames USING (sensor, exposure_id) "
+            "JOIN (SELECT sensor, exposure_id, avg(x_end_px - x_start_px) AS dx, "
+            "avg(y_end_px - y_start_px) AS dy FROM truth WHERE kind = 'star' GROUP BY 1, 2) "
+            "USING (sensor, exposure_id) WHERE attitude_valid AND time_s > 12").fetchall())
+
+    def test_images_and_generator_state_the_same(self):
+        image, generator = (np.mean(self.rows(name, "shared_xx_px2, shared_xy_px2, shared_yy_px2"),
+                                    axis=0) for name in ("image", "generator"))
+        print(f"shared displacement {np.sqrt(image[0] + image[2]):.5f} px in images, "
+              f"{np.sqrt(generator[0] + generator[2]):.5f} px in the generator")
+        # the bends that bright stars leave unknown differ a little
+        self.assertLess(np.abs(image - generator).max(), 0.05 * (image[0] + image[2]))
+
+    def test_it_lies_along_the_streaks_and_in_the_attitude(self):
+        for xx, xy, yy, dx, dy, sx, sy, r in self.rows(
+                "image", "shared_xx_px2, shared_xy_px2, shared_yy_px2, dx, dy, "
+                "attitude_sigma_x_arcsec, attitude_sigma_y_arcsec, attitude_correlation_xy"):
+            shared = np.array([[xx, xy], [xy, yy]])
+            # a rotation about y moves stars along x, one about x against y
+            attitude = np.array([[sy * sy, -r * sx * sy], [-r * sx * sy, sx * sx]]) / 9  # 3 arcsec
+            along = np.array([dx, dy]) / np.hypot(dx, dy)
+            across = np.array([-along[1], along[0]])
+            self.assertGreater(along @ shared @ along, 4 * (across @ shared @ across))
+            self.assertGreater(along @ attitude @ along, along @ shared @ along)
+            self.assertGreater(along @ attitude @ along, across @ attitude @ across)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -180,6 +180,9 @@ static void send_full_detections(bst_ctx *ctx, bst_recorder *recorder) {
     PUT(d, background_e, "background_e");
     PUT(d, noise_e, "noise_e");
     PUT(d, threshold_snr, "threshold_snr");
+    PUT(d, shared_xx, "shared_xx_px2");
+    PUT(d, shared_xy, "shared_xy_px2");
+    PUT(d, shared_yy, "shared_yy_px2");
     PUT(d, zero_point_mag, "zero_point_mag");
     PUT(d, zero_point_sigma_mag, "zero_point_sigma_mag");
     PUT_INT(d, zero_point_stars, "zero_point_stars");
@@ -261,6 +264,9 @@ static void send_full_tracks(bst_ctx *ctx, bst_recorder *recorder) {
     a->sigma_rad[0] = sigma.x;
     a->sigma_rad[1] = sigma.y;
     a->sigma_rad[2] = sigma.z;
+    PUT(a, correlation[0], "attitude_correlation_xy");
+    PUT(a, correlation[1], "attitude_correlation_xz");
+    PUT(a, correlation[2], "attitude_correlation_yz");
     PUT(a, rms_px, "attitude_rms_px");
     PUT(a, shared, "attitude_shared");
     table = "tracks";

@@ -177,6 +177,9 @@ static void noise_is_no_bend(void **state) {
             /* of the positive-part estimator at the origin, by quadrature over the chi-square of 2
              * degrees of freedom: E[(1 - 2/s)+^2 s] / 2 = 0.35 */
             assert_true(error2 < 0.45);
+            /* a third is stated of a bend that noise hides, 1 - 2/s of others: E of the larger,
+             * 1/3 for s < 3, is 0.382 */
+            bst_assert_close(stated2, 0.382, 0.03);
         }
     }
 }
@@ -221,6 +224,43 @@ static void a_bend_near_the_noise_is_half_believed(void **state) {
     }
 }
 
+/* Displacement that all streaks share, against closed forms for streaks that are long against
+ * their ends: w is the distance from an end in deviations s of the overlap of two profiles, and
+ * e = 2 s / length. Along, the weight of a path is w phi(w) about both ends: of the bend it takes
+ * 1 - 3 e E w + 1.5 e^2 E w^2 with E w = sqrt(pi / 2) and E w^2 = 2, and of a flat spectrum
+ * sum (2 n + 1) k_n^2 = sqrt(pi) / (4 e) - 1. Across, it is Phi at the ends: with 1 / sqrt(2 pi)
+ * and 1 / sqrt(pi) / 2 as the integrals of 1 - Phi and Phi (1 - Phi). */
+static void streaks_share_what_is_not_known_of_the_motion(void **state) {
+    (void)state;
+    const double sigma = 0.9, s = sigma * sqrt(2.0);
+    static const double lengths[] = {8.0, 20.0, 80.0}; /* in s; phi(8) is 1e-14 */
+    for (int i = 0; i < 3; i++) {
+        const double length = lengths[i] * s, e = 2.0 / lengths[i];
+        double along, across;
+        bst_camera_motion_shared_shift(length, sigma, 0.0, 0.02, &along, &across);
+        const double k2 = 1.0 - 3.0 * e * sqrt(0.5 * BST_PI) + 3.0 * e * e;
+        /* Simpson's rule with 512 steps */
+        bst_assert_close(along, pow(k2 * 0.02, 2), 1e-5 * 4e-4);
+        bst_assert_close(across, 0.0, 0.0);
+        bst_camera_motion_shared_shift(length, sigma, 0.02, 0.02, &along, &across);
+        const double flat = (sqrt(BST_PI) / (4.0 * e) - 1.0) / 5.0;
+        bst_assert_close(along / 4e-4, flat, 1e-4 * flat);
+        const double a = 2.0 - 2.0 * e / sqrt(2.0 * BST_PI);
+        const double b = a - 2.0 * e * 0.5 / sqrt(BST_PI);
+        bst_assert_close(across / 4e-4, (2.0 * b / (a * a) - 1.0) / 5.0, 1e-5);
+    }
+    /* a point is at its centroid */
+    double along = 1.0, across = 1.0;
+    bst_camera_motion_shared_shift(0.4 * sigma, sigma, 0.02, 0.02, &along, &across);
+    bst_assert_close(along + across, 0.0, 0.0);
+    /* in the axes of the frame: a streak at 30 degrees */
+    bst_detections d = {.count = 0};
+    bst_camera_motion_set_shared(sqrt(3.0), 1.0, 4.0, 0.4, &d);
+    bst_assert_close(d.shared_xx, 0.75 * 4.0 + 0.25 * 0.4, 1e-14); /* rounding */
+    bst_assert_close(d.shared_xy, sqrt(3.0) / 4.0 * 3.6, 1e-14);
+    bst_assert_close(d.shared_yy, 0.25 * 4.0 + 0.75 * 0.4, 1e-14);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_bend_near_the_noise_is_half_believed),
@@ -229,6 +269,7 @@ int main(void) {
         cmocka_unit_test(accelerated),
         cmocka_unit_test(few_samples),
         cmocka_unit_test(streak_is_the_stars_path),
+        cmocka_unit_test(streaks_share_what_is_not_known_of_the_motion),
         cmocka_unit_test(places_are_as_wrong_as_the_bend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -193,10 +193,13 @@ static void tracks_update_their_objects(void **state) {
     cJSON *manifest = cJSON_CreateObject();
     bst_run_custody_add(c, manifest);
     const cJSON *node = cJSON_GetObjectItem(manifest, "custody");
-    const char *keys[] = {"objects",    "updated",        "in_custody",   "tracks",
-                          "correlated", "ambiguous",      "uncorrelated", "cross_tags",
-                          "age_mean_s", "sigma_median_m", "sigma_p90_m",  "sigma_updated_median_m",
-                          "nees_mean",  "nees_low",       "nees_high"};
+    const char *keys[] = {"objects",         "updated",     "in_custody",
+                          "tracks",          "correlated",  "ambiguous",
+                          "uncorrelated",    "cross_tags",  "age_mean_s",
+                          "sigma_median_m",  "sigma_p90_m", "sigma_updated_median_m",
+                          "nees_mean",       "nees_low",    "nees_high",
+                          "unknown",         "candidates",  "candidates_confirmed",
+                          "candidates_wrong"};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
         assert_true(cJSON_IsNumber(cJSON_GetObjectItem(node, keys[i])));
     }
@@ -437,6 +440,66 @@ static void directions_update_their_object(void **state) {
     bst_world_free(world);
 }
 
+/* Custody without object A, by a seed that draws it and nothing else; or with all objects. */
+static bst_run_custody *without_a(bst_ctx *ctx, const bst_world *world, bst_run *store) {
+    for (uint64_t seed = 1; seed < 200; seed++) {
+        bst_scenario scenario = SCENARIO(seed, 0);
+        bst_run_custody *c;
+        bst_custody_figures f;
+        const int own[6] = {0, 0, 0, 0, 0, 0};
+        scenario.record.custody_unknown_share = 0.5;
+        if (bst_run_custody_create(ctx, world, &scenario, NULL, &c) != BST_OK) {
+            continue; /* all are unknown */
+        }
+        take_detected(ctx, c, world, own, 1, 100.0);
+        bst_assert_ok(ctx, bst_run_custody_finish(ctx, c, 500.0));
+        assert_true(bst_run_custody_figures(c, &f));
+        bst_run_custody_free(c);
+        if (f.unknown == 1 && f.uncorrelated == 1) {
+            bst_assert_ok(ctx, bst_run_custody_create(ctx, world, &scenario, store, &c));
+            return c;
+        }
+    }
+    fail_msg("no seed leaves out object A alone");
+    return NULL;
+}
+
+/* Tracks of an object that the catalogue lacks become a candidate: two of one object are linked,
+ * also after a saved state, and a third confirms it. Those of a known object do not. */
+static void unknown_objects_become_candidates(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    const int unknown[6] = {0, 0, 0, 0, 0, 0}, known[6] = {1, 1, 1, 1, 1, 1};
+    bst_custody_figures f;
+    bst_run_custody *c = without_a(&ctx, world, NULL);
+    take_detected(&ctx, c, world, unknown, 1, 100.0);
+    take_detected(&ctx, c, world, known, 2, 300.0);
+    bst_archive *saved;
+    bst_assert_ok(&ctx, bst_archive_create(&ctx, &saved));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, saved, "it"));
+    bst_assert_ok(&ctx, bst_run_custody_archive(c, saved));
+    bst_assert_ok(&ctx, bst_archive_end(&ctx, saved));
+    size_t size;
+    const void *bytes = bst_archive_data(saved, &size);
+    bst_run_custody *again = without_a(&ctx, world, NULL);
+    bst_archive *read;
+    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &read));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, read, "it"));
+    bst_assert_ok(&ctx, bst_run_custody_archive(again, read));
+    bst_archive_free(read);
+    bst_archive_free(saved);
+    take_detected(&ctx, again, world, unknown, 3, 7000.0);
+    take_detected(&ctx, again, world, unknown, 4, 13000.0);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, again, 14000.0));
+    assert_true(bst_run_custody_figures(again, &f));
+    assert_true(f.unknown == 1 && f.uncorrelated == 3 && f.cross_tags == 0);
+    assert_true(f.candidates == 1 && f.candidates_confirmed == 1 && f.candidates_wrong == 0);
+    bst_run_custody_free(c);
+    bst_run_custody_free(again);
+    bst_world_free(world);
+}
+
 static void off_and_without_objects(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -469,6 +532,7 @@ int main(void) {
         cmocka_unit_test(a_failed_update_is_counted),
         cmocka_unit_test(neighbours_are_ambiguous),
         cmocka_unit_test(directions_update_their_object),
+        cmocka_unit_test(unknown_objects_become_candidates),
         cmocka_unit_test(off_and_without_objects),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

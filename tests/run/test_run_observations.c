@@ -16,6 +16,8 @@ static const double places[FRAMES][2] = {{101.5, 700.25}, {433, 58}, {300, 300},
 static const double covariances[FRAMES][3] = {
     {0.04, 0.015, 0.09}, {0.16, -0.05, 0.025}, {1, 0, 1}, {1, 0, 1}};
 static const double sigmas_arcsec[FRAMES][3] = {{1, 2, 40}, {3, 1.5, 60}, {1, 1, 1}, {1, 1, 1}};
+/* about x and y, x and z, y and z */
+static const double correlations[3] = {0.7, -0.4, 0.2};
 static const double attitudes[FRAMES][4] = {{0.1, -0.2, 0.4, 0.8888194417315589},
                                             {0.12, -0.2, 0.42, 0.877040477971228},
                                             {0, 0, 0, 1},
@@ -71,6 +73,7 @@ static void make_run(run_tables *t) {
         " attitude_q_cam_from_gcrf_x REAL, attitude_q_cam_from_gcrf_y REAL,"
         " attitude_q_cam_from_gcrf_z REAL, attitude_q_cam_from_gcrf_w REAL,"
         " attitude_sigma_x_arcsec REAL, attitude_sigma_y_arcsec REAL, attitude_sigma_z_arcsec "
+        "REAL, attitude_correlation_xy REAL, attitude_correlation_xz REAL, attitude_correlation_yz "
         "REAL, attitude_shared REAL);"
         "CREATE TABLE detections (sensor INT, exposure_id INT, x_px REAL, y_px REAL,"
         " cov_xx_px2 REAL, cov_xy_px2 REAL, cov_yy_px2 REAL);"
@@ -80,13 +83,13 @@ static void make_run(run_tables *t) {
         const double *q = attitudes[k], *s = sigmas_arcsec[k], *c = covariances[k];
         run_tables_sql(t,
                        "INSERT INTO track_frames VALUES (0, %d, %d, %.17g, %.17g, %.17g, %.17g, %g,"
-                       " %g, %g, %g);"
+                       " %g, %g, %g, %g, %g, %g);"
                        "INSERT INTO detection_frames VALUES (0, %d, %d, %d);"
                        "INSERT INTO detections VALUES (0, %d, %.17g, %.17g, %g, %g, %g), (0, %d, "
                        "5, 5, 9, 9, 9)",
-                       k, k != 2, q[0], q[1], q[2], q[3], s[0], s[1], s[2], k == 1 ? 0.64 : 0.5, k,
-                       tick_of(k) - 1800, tick_of(k) + 1200, k, places[k][0], places[k][1], c[0],
-                       c[1], c[2], k);
+                       k, k != 2, q[0], q[1], q[2], q[3], s[0], s[1], s[2], correlations[0],
+                       correlations[1], correlations[2], k == 1 ? 0.64 : 0.5, k, tick_of(k) - 1800,
+                       tick_of(k) + 1200, k, places[k][0], places[k][1], c[0], c[1], c[2], k);
         put_track(t, 7, k, k == 1 ? "confirmed" : "tentative", k == 1, k == 3);
         put_track(t, 8, k, "tentative", 0, 0);
     }
@@ -151,6 +154,10 @@ static void expect_measured(const bst_camera *camera, const bst_od_observation *
             c[i][i] = sigma * sigma;
         }
     }
+    for (int i = 0; i < 3; i++) {
+        const int a = 2 + i / 2, b = i < 1 ? 3 : 4;
+        c[a][b] = c[b][a] = correlations[i] * sqrt(c[a][a] * c[b][b]);
+    }
     for (int i = 0; i < 5; i++) {
         for (int m = 0; m < 5; m++) {
             ee += e[i] * c[i][m] * e[m];
@@ -165,12 +172,19 @@ static void expect_measured(const bst_camera *camera, const bst_od_observation *
     bst_assert_close(o->cov_12, en, margin);
     bst_assert_close(o->cov_22, nn, margin);
     /* the latest frame's share of the variance about camera x and y is common */
+    double of_both[3] = {0}, common[3] = {0};
     for (int i = 0; i < 2; i++) {
-        double sigma = sigmas_arcsec[k][i] * BST_ARCSEC_RAD, variance = 0.64 * sigma * sigma;
-        double a = o->shared_rad[0][i], b = o->shared_rad[1][i];
-        bst_assert_close(a * a, variance * e[2 + i] * e[2 + i], 5e-4 * variance);
-        bst_assert_close(a * b, variance * e[2 + i] * n[2 + i], 5e-4 * variance);
-        bst_assert_close(b * b, variance * n[2 + i] * n[2 + i], 5e-4 * variance);
+        for (int m = 0; m < 2; m++) {
+            of_both[0] += 0.64 * e[2 + i] * c[2 + i][2 + m] * e[2 + m];
+            of_both[1] += 0.64 * e[2 + i] * c[2 + i][2 + m] * n[2 + m];
+            of_both[2] += 0.64 * n[2 + i] * c[2 + i][2 + m] * n[2 + m];
+        }
+        common[0] += o->shared_rad[0][i] * o->shared_rad[0][i];
+        common[1] += o->shared_rad[0][i] * o->shared_rad[1][i];
+        common[2] += o->shared_rad[1][i] * o->shared_rad[1][i];
+    }
+    for (int i = 0; i < 3; i++) {
+        bst_assert_close(common[i], of_both[i], 5e-4 * (of_both[0] + of_both[2]));
     }
 }
 

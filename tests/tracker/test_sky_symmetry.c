@@ -43,6 +43,10 @@ static void skew(world *w, int frame) {
         d->cov_yy = along * sin(a) * sin(a) + across * cos(a) * cos(a);
         d->cov_xy = (along - across) * sin(a) * cos(a);
     }
+    /* a displacement of all streaks, 0.1 px at an angle */
+    w->detections->shared_xx = 0.009;
+    w->detections->shared_xy = -0.003;
+    w->detections->shared_yy = 0.002;
 }
 
 /* The same detections on the rolled camera: (x, y) about the middle are (-y, x). */
@@ -58,6 +62,9 @@ static void roll_detections(const twin *t, const world *w) {
         to->items[i].cov_yy = d->cov_xx;
         to->items[i].cov_xy = -d->cov_xy;
     }
+    to->shared_xx = w->detections->shared_yy;
+    to->shared_yy = w->detections->shared_xx;
+    to->shared_xy = -w->detections->shared_xy;
     bst_quat back = bst_quat_conj(t->turn);
     to->q_telemetry_from_gcrf =
         bst_quat_mul(t->roll, bst_quat_mul(w->detections->q_telemetry_from_gcrf, back));
@@ -119,7 +126,42 @@ static void expect_fix(const twin *t, const bst_attitude_fix *a, const bst_attit
     bst_assert_close(b->sigma_rad[0], a->sigma_rad[1], 1e-6 * a->sigma_rad[1]);
     bst_assert_close(b->sigma_rad[1], a->sigma_rad[0], 1e-6 * a->sigma_rad[0]);
     bst_assert_close(b->sigma_rad[2], a->sigma_rad[2], 1e-6 * a->sigma_rad[2]);
+    bst_assert_close(b->correlation[0], -a->correlation[0], 1e-6);
+    bst_assert_close(b->correlation[1], -a->correlation[2], 1e-6);
+    bst_assert_close(b->correlation[2], a->correlation[1], 1e-6);
     bst_assert_close(b->rms_px, a->rms_px, 1e-6);
+}
+
+/* A displacement that all streaks share is a rotation about the axis across it: a covariance in
+ * pixels becomes one of the attitude, and less of the whole is shared by frames. */
+static void a_displacement_of_all_streaks_turns_the_camera(void **state) {
+    (void)state;
+    static const options o = {.sigma_px = 0.1, .pd = 1.0, .frames = 1};
+    static const double shift[3] = {0.25, -0.1, 0.06}; /* xx, xy, yy, px^2 */
+    const double scale = bst_camera_scale_rad(&camera);
+    double xx[2], xy[2], yy[2], shared[2];
+    for (int with = 0; with < 2; with++) {
+        static world w;
+        world_open(&w, 6, &o);
+        (void)expose(&w, 0);
+        w.detections->shared_xx = with ? shift[0] : 0.0;
+        w.detections->shared_xy = with ? shift[1] : 0.0;
+        w.detections->shared_yy = with ? shift[2] : 0.0;
+        bst_tracker_input input = make_input(&w, 0);
+        (void)bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256);
+        const bst_attitude_fix *fix = &w.tracks->attitude;
+        assert_true(fix->valid);
+        xx[with] = fix->sigma_rad[0] * fix->sigma_rad[0];
+        yy[with] = fix->sigma_rad[1] * fix->sigma_rad[1];
+        xy[with] = fix->correlation[0] * fix->sigma_rad[0] * fix->sigma_rad[1];
+        shared[with] = fix->shared;
+        world_close(&w);
+    }
+    const double unit = scale * scale; /* rounding: 1e-9 of it */
+    bst_assert_close((xx[1] - xx[0]) / unit, shift[2], 1e-9);
+    bst_assert_close((yy[1] - yy[0]) / unit, shift[0], 1e-9);
+    bst_assert_close((xy[1] - xy[0]) / unit, -shift[1], 1e-9);
+    bst_assert_close(shared[1] / shared[0], (xx[0] + yy[0]) / (xx[1] + yy[1]), 1e-9);
 }
 
 static void a_turned_sky(void **state) {
@@ -225,8 +267,10 @@ static void both_axes_of_an_object_are_needed(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_turned_sky),
-                                       cmocka_unit_test(both_axes_of_the_attitude_are_needed),
-                                       cmocka_unit_test(both_axes_of_an_object_are_needed)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_turned_sky),
+        cmocka_unit_test(a_displacement_of_all_streaks_turns_the_camera),
+        cmocka_unit_test(both_axes_of_the_attitude_are_needed),
+        cmocka_unit_test(both_axes_of_an_object_are_needed)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -56,6 +56,30 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     return count;
 }
 
+/* Adds the displacement that all streaks share to the covariance of an attitude: rotations about
+ * camera x and y, which move the stars at the middle of the frame by -y and x. Returns the share of
+ * the variance about both that was there before. */
+static double add_shared_shift(const bst_camera *camera, const bst_detections *d,
+                               double covariance[3][3]) {
+    const double before = covariance[0][0] + covariance[1][1], scale = bst_camera_scale_rad(camera);
+    double k[2][2];
+    bst_camera_jacobian(camera, (bst_vec3){0.0, 0.0, 1.0}, k);
+    /* px by rotation about x: -k[.][1] / scale, about y: k[.][0] / scale */
+    const double a = -k[0][1], b = k[0][0], c = -k[1][1], e = k[1][0];
+    const double f = scale / (a * e - b * c);
+    const double inverse[2][2] = {{e * f, -b * f}, {-c * f, a * f}};
+    const double shift[2][2] = {{d->shared_xx, d->shared_xy}, {d->shared_xy, d->shared_yy}};
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            for (int m = 0; m < 4; m++) {
+                covariance[i][j] += inverse[i][m / 2] * shift[m / 2][m % 2] * inverse[j][m % 2];
+            }
+        }
+    }
+    const double after = covariance[0][0] + covariance[1][1];
+    return after > 0.0 ? before / after : 1.0;
+}
+
 bst_quat bst_tracker_refer(const bst_tracker *t, bst_quat q_telemetry) {
     return t->referred ? bst_quat_unit(bst_quat_mul(q_telemetry, t->reference)) : q_telemetry;
 }
@@ -102,9 +126,13 @@ void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
     out->fix.stars = solution.stars_used;
     out->fix.valid = solution.valid;
     out->fix.rms_px = solution.rms_px;
+    double by_stars = 1.0; /* share of the variance about camera x and y */
     if (solution.valid) {
+        double covariance[3][3]; /* of the stars' own errors and of the displacement of all */
+        memcpy(covariance, solution.covariance, sizeof covariance);
+        by_stars = add_shared_shift(&t->camera, input->detections, covariance);
         out->q_cam_from_gcrf = solution.q_cam_from_gcrf;
-        memcpy(out->covariance_cam, solution.covariance, sizeof out->covariance_cam);
+        memcpy(out->covariance_cam, covariance, sizeof out->covariance_cam);
         out->fix.error_cam_rad =
             bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf, bst_quat_conj(q_telemetry)));
         /* Stars that contradict the telemetry's history come from a camera that turned unevenly
@@ -118,9 +146,9 @@ void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
         bst_vec3 expected =
             t->error.started ? bst_vec3_from_array(t->error.e) : (bst_vec3){0.0, 0.0, 0.0};
         out->usable =
-            bst_attitude_error_update(&t->error, &t->error_params, q_known, e, solution.covariance);
+            bst_attitude_error_update(&t->error, &t->error_params, q_known, e, covariance);
         if (out->usable) {
-            rebase(t, expected, q_telemetry, solution.q_cam_from_gcrf, solution.covariance);
+            rebase(t, expected, q_telemetry, solution.q_cam_from_gcrf, covariance);
         }
         out->fix.valid = out->usable;
         if (out->usable) {
@@ -142,9 +170,15 @@ void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
         }
     }
     out->fix.q_cam_from_gcrf = out->q_cam_from_gcrf;
-    out->fix.shared = bst_attitude_shared_get(&t->shared);
+    out->fix.shared = by_stars * bst_attitude_shared_get(&t->shared);
     for (int i = 0; i < 3; i++) {
         out->fix.sigma_rad[i] = sqrt(out->covariance_cam[i][i]);
+    }
+    for (int i = 0; i < 3; i++) { /* xy, xz, yz */
+        const int a = i / 2, b = i < 1 ? 1 : 2;
+        const double of_both = out->fix.sigma_rad[a] * out->fix.sigma_rad[b];
+        out->fix.correlation[i] =
+            of_both > 0.0 ? fmin(fmax(out->covariance_cam[a][b] / of_both, -1.0), 1.0) : 0.0;
     }
     out->usable = out->usable &&
                   fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;

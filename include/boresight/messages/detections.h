@@ -81,6 +81,9 @@ typedef struct bst_detections {
     bst_quat q_telemetry_from_gcrf; /* telemetry alone, mid-exposure */
     double background_e, noise_e;   /* median per pixel */
     double threshold_snr;
+    /* covariance of a displacement that all streaks of stars share, px^2: by motion of the camera
+     * that is not known. cov_xx of the items is without it */
+    double shared_xx, shared_xy, shared_yy;
     /* V of one electron per second, from zero_point_stars of the frame's stars; if there are none,
      * the camera's nominal value */
     double zero_point_mag, zero_point_sigma_mag;

@@ -53,6 +53,7 @@ typedef struct bst_attitude_fix {
     bst_vec3 error_cam_rad;   /* rotation vector e, camera axes: q_stars = bst_quat_from_rotvec(e) *
                                  q_telemetry */
     double sigma_rad[3];      /* standard deviation about camera x, y, z */
+    double correlation[3];    /* of the errors about x and y, x and z, y and z */
     double rms_px;            /* of the star residuals */
     double shared; /* fraction of the variance about camera x and y that successive frames share, 0
                       to 1: errors tied to the stars */

@@ -5,7 +5,7 @@ from typing import Any, Dict, List
 
 import numpy as np
 
-VERSION = 7
+VERSION = 8
 
 # Members of each message's record, then of its items: name:type, x for an array. A test compares
 # them with docs/reference/icd.md.
@@ -74,6 +74,7 @@ _TABLES = {
     "detections": (
         "exposure_id:i8 start_tick:i8 end_tick:i8 q_cam_from_gcrf:f8x4 "
         "q_telemetry_from_gcrf:f8x4 background_e:f8 noise_e:f8 threshold_snr:f8 "
+        "shared_xx:f8 shared_xy:f8 shared_yy:f8 "
         "zero_point_mag:f8 zero_point_sigma_mag:f8 zero_point_stars:i4 "
         "stars_identified:i4 windows:i4 count:i4 lost:i4 bad_pixels:i4 "
         "calibration.frames:i4 calibration.scale:f8 calibration.rotation_rad:f8 "
@@ -95,7 +96,7 @@ _TABLES = {
     "tracks": (
         "exposure_id:i8 tick:i8 attitude.valid:i4 attitude.stars:i4 attitude.tick:i8 "
         "attitude.q_cam_from_gcrf:f8x4 attitude.error_cam_rad:f8x3 "
-        "attitude.sigma_rad:f8x3 attitude.rms_px:f8 attitude.shared:f8 "
+        "attitude.sigma_rad:f8x3 attitude.correlation:f8x3 attitude.rms_px:f8 attitude.shared:f8 "
         "target_id:i8 at_rest:i4 count:i4 "
         "lost:i4",
         "id:i8 status:i4 target_of_interest:i4 direction_gcrf:f8x3 rate_gcrf_radps:f8x3 "

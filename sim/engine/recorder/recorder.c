@@ -75,6 +75,9 @@ const bst_config_desc bst_record_config_table[] = {
     BST_REAL(bst_recorder_config, custody_within_m, "m", 1, 1e9, "1000",
              "custody: an object is in custody if the standard deviation of its position is at "
              "most this."),
+    BST_REAL(bst_recorder_config, custody_unknown_share, "", 0, 1, "0",
+             "custody: share of the objects that the catalogue lacks, drawn by the seed. Their "
+             "tracks may be linked to candidate objects."),
     BST_REAL(bst_recorder_config, telemetry_hz, "Hz", 0.0, 1e6, "1",
              "Rate at which telemetry, control status and the true line of sight are kept; 0: "
              "not at all."),

@@ -39,6 +39,7 @@ typedef struct bst_recorder_config {
     double custody_timeout_s;
     bool custody; /* tables `custody` and `custody_tracks`, written by the caller */
     double custody_sigma_m, custody_drift_m_per_day, custody_noise_m_per_day, custody_within_m;
+    double custody_unknown_share;
     double telemetry_hz;
 } bst_recorder_config;
 

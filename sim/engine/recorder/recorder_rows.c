@@ -300,6 +300,9 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     put_real(&head, d->background_e);
     put_real(&head, d->noise_e);
     put_real(&head, d->threshold_snr);
+    put_real(&head, d->shared_xx);
+    put_real(&head, d->shared_xy);
+    put_real(&head, d->shared_yy);
     put_real(&head, d->zero_point_mag);
     put_real(&head, d->zero_point_sigma_mag);
     put_int(&head, d->zero_point_stars);
@@ -425,6 +428,9 @@ bst_status bst_recorder_track_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     put_vector(&r, bst_vec3_scale(a->error_cam_rad, a->valid ? ARCSEC : NAN));
     for (int i = 0; i < 3; i++) {
         put_real(&r, a->sigma_rad[i] * (a->valid ? ARCSEC : NAN));
+    }
+    for (int i = 0; i < 3; i++) {
+        put_real(&r, a->valid ? a->correlation[i] : NAN);
     }
     put_real(&r, a->valid ? a->rms_px : NAN);
     put_real(&r, a->valid ? a->shared : NAN);

@@ -1,0 +1,115 @@
+#include "tracker/orbit/orbit_link.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+/* standard deviations of chi-square beyond its expectation, up to which an arc fits */
+static const double MOST_SIGMAS = 5.0;
+
+/* Largest chi-square of directions that fit an orbit. */
+static double most_chi2(int count) {
+    const double dof = 2.0 * count - 6.0;
+    return dof + MOST_SIGMAS * sqrt(2.0 * dof);
+}
+
+/* Joins the directions of an item and of an arc in order of time; every second one of the item's
+ * is left out until there is room. Returns their number. */
+static int join(const bst_od_linked *item, const bst_od_observation *arc, int count,
+                bst_od_observation out[BST_OD_LINK_DIRECTIONS]) {
+    int every = 1, n = 0, k = 0;
+    while ((item->count + every - 1) / every + count > BST_OD_LINK_DIRECTIONS) {
+        every *= 2;
+    }
+    for (int i = 0; i < item->count; i += every) {
+        for (; k < count && arc[k].observer.time_s < item->directions[i].observer.time_s; k++) {
+            out[n++] = arc[k];
+        }
+        out[n++] = item->directions[i];
+    }
+    for (; k < count; k++) {
+        out[n++] = arc[k];
+    }
+    return n;
+}
+
+/* Fits an orbit to an item's directions and those of an arc. False: they do not fit. */
+static bool fits(const bst_od_linked *item, const bst_od_motion *motion,
+                 const bst_od_observation *arc, int count, bst_od_linked *out) {
+    const bst_od_options options = {.motion = *motion};
+    bst_ctx quiet = {0};
+    bst_od_solution found;
+    out->count = join(item, arc, count, out->directions);
+    const bst_status status =
+        item->arcs > 1
+            ? bst_od_fit(&quiet, out->directions, out->count, &options, &item->state, NULL, &found)
+            : bst_od_determine(&quiet, out->directions, out->count, &options, NULL, &found, NULL);
+    if (status != BST_OK || !(found.chi2 < most_chi2(out->count))) {
+        return false;
+    }
+    out->arcs = item->arcs + 1;
+    out->state = found.state;
+    out->chi2 = found.chi2;
+    out->id = item->id;
+    return true;
+}
+
+/* Index of the item that gives its place to a new one. */
+static int place_of(bst_od_linker *l) {
+    int oldest = 0;
+    if (l->count < BST_OD_LINK_ORBITS) {
+        return l->count++;
+    }
+    for (int i = 1; i < l->count; i++) {
+        const bool waits = l->items[i].arcs == 1, kept = l->items[oldest].arcs == 1;
+        if (waits == kept ? l->items[i].id < l->items[oldest].id : waits) {
+            oldest = i;
+        }
+    }
+    return oldest;
+}
+
+int bst_od_link_arc(bst_od_linker *l, const bst_od_motion *motion,
+                    const bst_od_observation *directions, int count, double within_s) {
+    assert(l && motion && directions && count >= BST_OD_LEAST &&
+           count <= BST_OD_LINK_DIRECTIONS / 2);
+    bst_od_linked best = {.arcs = 0};
+    int chosen = -1;
+    /* first the orbits, then the arcs that wait */
+    for (int waiting = 0; waiting < 2 && chosen < 0; waiting++) {
+        for (int i = 0; i < l->count; i++) {
+            const bst_od_linked *item = &l->items[i];
+            const double last_s = item->directions[item->count - 1].observer.time_s;
+            bst_od_linked now;
+            if ((item->arcs == 1) == (waiting == 1) &&
+                directions[0].observer.time_s - last_s <= within_s &&
+                fits(item, motion, directions, count, &now) &&
+                (chosen < 0 || now.chi2 - 2.0 * now.count < best.chi2 - 2.0 * best.count)) {
+                best = now;
+                chosen = i;
+            }
+        }
+    }
+    if (chosen < 0) {
+        chosen = place_of(l);
+        best = (bst_od_linked){.arcs = 1, .count = count, .id = ++l->made};
+        memcpy(best.directions, directions, (size_t)count * sizeof *directions);
+    }
+    l->items[chosen] = best;
+    return chosen;
+}
+
+bst_status bst_od_linker_archive(bst_od_linker *l, bst_archive *archive) {
+    l->count = bst_archive_count(archive, l->count, BST_OD_LINK_ORBITS);
+    BST_ARCHIVE(archive, l->made);
+    for (int i = 0; i < l->count; i++) {
+        BST_ARCHIVE(archive, l->items[i]);
+        if (l->items[i].count < 1 || l->items[i].count > BST_OD_LINK_DIRECTIONS ||
+            l->items[i].arcs < 1) {
+            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                            "the saved state has %d directions of %d arcs of an unknown object",
+                            (int)l->items[i].count, (int)l->items[i].arcs);
+        }
+    }
+    return BST_OK;
+}
