@@ -261,6 +261,7 @@ def main():
         library = Library(tree, options.folder, random.Random(options.seed), options.each, scratch)
         library.compile()
         names = tree.judges_of(library.functions[0].path, "unit")
+        tree.make(*sorted({tree.program_of(name) for name in names}))
         with ThreadPoolExecutor(2) as pool:
             tests = list(filter(None, pool.map(lambda n: enter(tree, library, n, options.longest, scratch), names)))
         tests.sort(key=lambda t: t[2])
