@@ -156,6 +156,15 @@ WRAP(bst_status, bst_truth_list_fill,
     assert_non_null(list->source_of);
     assert_int_equal(request->count, ITEMS);
     assert_int_equal(request->binning, 2);
+    /* the brightest pixel of a Gaussian at its middle; the source before the last is a ghost, whose
+     * blur widens it */
+    const bst_truth_item still = {.electrons = 1000.0};
+    const double own = 2.0 / 2.3548200450309493, widths[2] = {own, hypot(own, 1.5)};
+    for (int k = 0; k < 2; k++) {
+        double share = erf(0.5 / (widths[k] * sqrt(2.0)));
+        bst_assert_close(request->peak_e(request->user, ITEMS - 1 - k, &still),
+                         1000.0 * share * share, 1e-3);
+    }
     assert_true(capacity >= ITEMS);
     truth->count = ITEMS;
     for (int i = 0; i < ITEMS; i++) {
@@ -331,6 +340,7 @@ static void begin(void) {
     two = two ? two : calloc(1, sizeof *two + 2 * sizeof two->items[0]);
     assert_non_null(two);
     two->count = 2;
+    two->items[1].sigma_px = 1.5;
     m.camera.ghost_images = two;
     m.exposure = (bst_exposure){
         .id = 4, .start_tick = START, .end_tick = END, .window = {40, 20, 300, 200}, .binning = 2};
