@@ -12,6 +12,8 @@
 enum { N = BST_CUSTODY_STATE, MOST = 6 };
 #define DAY_S 86400.0
 
+static const double photocentre_m = 4.0;
+
 /* TEME turned by 0.7 rad about an axis that is none of its own. */
 static bst_mat3 turned_axes(void) {
     return bst_quat_to_mat3(bst_quat_from_rotvec((bst_vec3){0.3, -0.5, 0.4}));
@@ -174,10 +176,11 @@ static bst_od_observer observer_near(const bst_elements *set, double offset_s) {
     return eye;
 }
 
-/* P H' and the gain K = P H' S^-1, S = H P H' + R. */
+/* P H', S^-1 with S = H P H' + R, and the gain K = P H' S^-1. */
 static void gain_of(int size, double h[MOST][N], double r[MOST][MOST],
-                    const bst_custody_filter *before, double ph[N][MOST], double k[N][MOST]) {
-    double s[MOST][MOST], inverse[MOST][MOST];
+                    const bst_custody_filter *before, double ph[N][MOST],
+                    double inverse[MOST][MOST], double k[N][MOST]) {
+    double s[MOST][MOST];
     for (int i = 0; i < N; i++) {
         for (int a = 0; a < size; a++) {
             ph[i][a] = 0.0;
@@ -208,8 +211,8 @@ static void gain_of(int size, double h[MOST][N], double r[MOST][MOST],
 /* Variance of the place along the orbit after an update. */
 static double updated_variance(int size, double h[MOST][N], double r[MOST][MOST],
                                const bst_custody_filter *before) {
-    double ph[N][MOST], k[N][MOST], p = before->p[5][5];
-    gain_of(size, h, r, before, ph, k);
+    double ph[N][MOST], inverse[MOST][MOST], k[N][MOST], p = before->p[5][5];
+    gain_of(size, h, r, before, ph, inverse, k);
     for (int a = 0; a < size; a++) {
         p -= k[5][a] * ph[5][a];
     }
@@ -220,8 +223,8 @@ static double updated_variance(int size, double h[MOST][N], double r[MOST][MOST]
 static void check_update(int size, double h[MOST][N], double y[MOST], double r[MOST][MOST],
                          const bst_custody_filter *before, const bst_custody_filter *after,
                          double share) {
-    double ph[N][MOST], k[N][MOST];
-    gain_of(size, h, r, before, ph, k);
+    double ph[N][MOST], inverse[MOST][MOST], k[N][MOST];
+    gain_of(size, h, r, before, ph, inverse, k);
     for (int i = 0; i < N; i++) {
         double x = before->x[i];
         for (int a = 0; a < size; a++) {
@@ -268,7 +271,7 @@ static void one_observation(void **state) {
                   /* near the equator x changes the osculating elements: perturbations of the
                    * difference are a thousandth of it in a revolution */
                   {0.05, 0.01, 1.9, 4e-2}};
-    const double offset_s = 30000.0, photocentre_m = 4.0;
+    const double offset_s = 30000.0;
     for (int o = 0; o < 3; o++) {
         bst_ctx ctx = {0};
         const double share = orbits[o].share;
@@ -320,15 +323,11 @@ static void one_observation(void **state) {
                 }
             }
         }
+        const double log_det = invert(4, (const double(*)[MOST])s, inverse);
         for (int i = 0; i < 4; i++) {
             bst_assert_close(out.innovation[i], y[i], share * sqrt(s[i][i]));
             for (int j = 0; j < 4; j++) {
                 bst_assert_close(out.covariance[i][j], s[i][j], share * sqrt(s[i][i] * s[j][j]));
-            }
-        }
-        const double log_det = invert(4, (const double(*)[MOST])s, inverse);
-        for (int i = 0; i < 4; i++) {
-            for (int j = 0; j < 4; j++) {
                 chi2 += y[i] * inverse[i][j] * y[j];
             }
         }
@@ -340,78 +339,124 @@ static void one_observation(void **state) {
     }
 }
 
-/* Directions with errors of their own and errors that they share, which change between them by
- * unequal amounts; the photocentre's are the same for all. The variance of unit weight multiplies
- * the first two: it is what makes one element of the covariance right, and must then make all. */
-static void directions_that_share_errors(void **state) {
-    (void)state;
-    enum { COUNT = 3 };
+enum { COUNT = 3 };
+
+/* A pass of three directions with errors of their own and errors that they share, which change
+ * between them by unequal amounts; the photocentre's are the same for all. */
+typedef struct pass {
+    bst_custody_orbit orbit;
+    bst_custody_filter filter;
+    bst_od_observation list[COUNT];
+    double range_m[COUNT], h[MOST][N], y[MOST];
+} pass;
+
+/* *out: all directions are off by `off_rad` along their first axes beside errors of their own. */
+static void make_pass(double off_rad, pass *out) {
+    static const double change[COUNT] = {9.0, 0.3, 0.8}, at_s[COUNT] = {0.0, 25.0, 90.0};
     bst_ctx ctx = {0};
     const bst_elements set = orbit_of(68.0, 0.02, 1.6);
-    const double offset_s = -20000.0, photocentre_m = 4.0, share = 1e-3;
-    const double change[COUNT] = {9.0, 0.3, 0.8}, at_s[COUNT] = {0.0, 25.0, 90.0};
-    bst_custody_orbit orbit;
-    bst_custody_filter filter = {.x = {40.0, -25.0, 18.0, 30.0, -22.0, 35.0}}, after;
-    bst_od_observation list[COUNT];
-    look seen[COUNT];
-    double h[MOST][N], y[MOST], r[MOST][MOST];
-    const bst_mat3 turned = turned_axes();
+    const double offset_s = -20000.0;
     const bst_od_observer eye = observer_near(&set, offset_s);
-    slanting(filter.p);
-    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, offset_s, photocentre_m, &orbit));
+    *out = (pass){.filter = {.x = {40.0, -25.0, 18.0, 30.0, -22.0, 35.0}}};
+    slanting(out->filter.p);
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, offset_s, photocentre_m, &out->orbit));
     for (int i = 0; i < COUNT; i++) {
         double part[4][N], miss[4];
         bst_od_observer from = eye;
         from.time_s += at_s[i];
         from.position_m = bst_vec3_axpy(eye.position_m, at_s[i], eye.velocity_mps);
-        seen[i] = look_at(&set, offset_s, filter.x, &from);
-        list[i] = (bst_od_observation){
+        const look seen = look_at(&set, offset_s, out->filter.x, &from);
+        bst_od_observation *z = &out->list[i];
+        *z = (bst_od_observation){
             .observer = from,
-            .direction = beside(seen[i].direction, 5e-6 - 3e-6 * i, -2e-6 + 4e-6 * i),
+            .direction = beside(seen.direction, off_rad + 5e-6 - 3e-6 * i, -2e-6 + 4e-6 * i),
             .cov_11 = 9e-12,
             .cov_12 = -3e-12 + 2e-12 * i,
             .cov_22 = 7e-12 + 1e-12 * i,
             .shared_rad = {{1.6e-6, -0.7e-6}, {0.5e-6 + 0.2e-6 * i, 1.2e-6}},
             .shared_change = change[i]};
-        less(&seen[i], list[i].direction, seen[i].rate_radps, miss);
-        slopes(&set, offset_s, filter.x, &from, list[i].direction, part);
+        out->range_m[i] = seen.range_m;
+        less(&seen, z->direction, seen.rate_radps, miss);
+        slopes(&set, offset_s, out->filter.x, &from, z->direction, part);
         for (int a = 0; a < 2; a++) {
-            y[2 * i + a] = -miss[a];
-            memcpy(h[2 * i + a], part[a], sizeof part[a]);
+            out->y[2 * i + a] = -miss[a];
+            memcpy(out->h[2 * i + a], part[a], sizeof part[a]);
         }
     }
-    after = filter;
-    assert_true(bst_custody_update_directions(&orbit, &turned, list, COUNT, &after));
-    double low = 0.1, high = 10.0;
-    for (int trial = 0; trial < 60; trial++) {
-        const double factor = sqrt(low * high);
-        for (int i = 0; i < COUNT; i++) {
-            for (int k = i; k < COUNT; k++) {
-                const axes a = axes_at(list[i].direction), b = axes_at(list[k].direction);
-                const bst_vec3 ea[2] = {a.e1, a.e2}, eb[2] = {b.e1, b.e2};
-                const double own[2][2] = {{list[i].cov_11, list[i].cov_12},
-                                          {list[i].cov_12, list[i].cov_22}};
-                double changes = 0.0;
-                for (int m = i + 1; m <= k; m++) {
-                    changes += change[m];
-                }
-                for (int p = 0; p < 2; p++) {
-                    for (int q = 0; q < 2; q++) {
-                        const double *sa = list[i].shared_rad[p], *sb = list[k].shared_rad[q];
-                        const double both = exp(-changes) * (sa[0] * sb[0] + sa[1] * sb[1]);
-                        r[2 * i + p][2 * k + q] = r[2 * k + q][2 * i + p] =
-                            factor * (i == k ? own[p][q] : both) +
-                            photocentre_m * photocentre_m / (seen[i].range_m * seen[k].range_m) *
-                                bst_vec3_dot(ea[p], eb[q]);
-                    }
+}
+
+/* Covariance of the directions' errors; `factor` multiplies all but the photocentre's part. */
+static void errors_of(const pass *t, double factor, double r[MOST][MOST]) {
+    for (int i = 0; i < COUNT; i++) {
+        for (int k = i; k < COUNT; k++) {
+            const bst_od_observation *u = &t->list[i], *v = &t->list[k];
+            const axes a = axes_at(u->direction), b = axes_at(v->direction);
+            const bst_vec3 ea[2] = {a.e1, a.e2}, eb[2] = {b.e1, b.e2};
+            const double own[2][2] = {{u->cov_11, u->cov_12}, {u->cov_12, u->cov_22}};
+            double changes = 0.0;
+            for (int m = i + 1; m <= k; m++) {
+                changes += t->list[m].shared_change;
+            }
+            for (int p = 0; p < 2; p++) {
+                for (int q = 0; q < 2; q++) {
+                    const double *sa = u->shared_rad[p], *sb = v->shared_rad[q];
+                    const double both = exp(-changes) * (sa[0] * sb[0] + sa[1] * sb[1]);
+                    r[2 * i + p][2 * k + q] = r[2 * k + q][2 * i + p] =
+                        factor * (i == k ? own[p][q] : both) + photocentre_m * photocentre_m /
+                                                                   (t->range_m[i] * t->range_m[k]) *
+                                                                   bst_vec3_dot(ea[p], eb[q]);
                 }
             }
         }
-        *(updated_variance(2 * COUNT, h, r, &filter) < after.p[5][5] ? &low : &high) = factor;
+    }
+}
+
+/* The variance of unit weight multiplies the errors of the directions: it is what makes one element
+ * of the covariance right, and must then make all. */
+static void directions_that_share_errors(void **state) {
+    (void)state;
+    const bst_mat3 turned = turned_axes();
+    pass t;
+    double r[MOST][MOST];
+    make_pass(0.0, &t);
+    bst_custody_filter after = t.filter;
+    assert_true(bst_custody_update_directions(&t.orbit, &turned, t.list, COUNT, &after));
+    double low = 0.1, high = 10.0;
+    for (int trial = 0; trial < 60; trial++) {
+        const double factor = sqrt(low * high);
+        errors_of(&t, factor, r);
+        *(updated_variance(2 * COUNT, t.h, r, &t.filter) < after.p[5][5] ? &low : &high) = factor;
     }
     /* the errors are about as large as stated: 20 known degrees of freedom against 5 or less */
     assert_true(low > 0.8 && low < 1.3);
-    check_update(2 * COUNT, h, y, r, &filter, &after, share);
+    check_update(2 * COUNT, t.h, t.y, r, &t.filter, &after, 1e-3);
+}
+
+/* Directions farther off than errors of twice the size are with probability 2e-5 are refused: the
+ * chi-square of six of them, a quarter of that of errors as stated, has exp(-x / 2) (1 + x / 2 +
+ * x^2 / 8) above x. */
+static void directions_of_another_object(void **state) {
+    (void)state;
+    const bst_mat3 turned = turned_axes();
+    double low = 1e-5, high = 3e-3, r[MOST][MOST], ph[N][MOST], k[N][MOST], inverse[MOST][MOST],
+           x = 0.0;
+    pass t;
+    for (int trial = 0; trial < 16; trial++) {
+        const double middle = 0.5 * (low + high);
+        make_pass(middle, &t);
+        bst_custody_filter filter = t.filter;
+        *(bst_custody_update_directions(&t.orbit, &turned, t.list, COUNT, &filter) ? &low : &high) =
+            middle;
+    }
+    errors_of(&t, 1.0, r);
+    gain_of(2 * COUNT, t.h, r, &t.filter, ph, inverse, k);
+    for (int a = 0; a < 2 * COUNT; a++) {
+        for (int b = 0; b < 2 * COUNT; b++) {
+            x += 0.25 * t.y[a] * inverse[a][b] * t.y[b];
+        }
+    }
+    /* Wilson and Hilferty's cube root is 0.7 too large there, which makes 1.4e-5 of it */
+    bst_assert_close(exp(-0.5 * x) * (1.0 + 0.5 * x + 0.125 * x * x), 1.4e-5, 0.1e-5);
 }
 
 /* The first covariance, the drift's share in the place along the orbit, and process noise, which is
@@ -458,9 +503,7 @@ static void covariances_of_a_filter(void **state) {
     bst_assert_close(aged.p[5][0] - filter.p[5][0], sum[1], -1e-6 * sum[1]);
     bst_assert_close(aged.p[5][5] - filter.p[5][5], sum[2], 1e-6 * sum[2]);
     slanting(slanted.p);
-    double p[MOST][MOST];
-    memcpy(p, slanted.p, sizeof p);
-    invert(N, (const double(*)[MOST])p, inverse);
+    invert(N, (const double(*)[MOST])slanted.p, inverse); /* N is MOST */
     for (int i = 0; i < N; i++) {
         for (int j = 0; j < N; j++) {
             nees += slanted.x[i] * inverse[i][j] * slanted.x[j];
@@ -533,8 +576,7 @@ static void outliers_of_an_arc(void **state) {
                  {2, {1.0, 2.0, 4.0}, {0.1, 0.2, 1.2}},
                  {3, {1.0, 2.0, 3.0}, {0.1, 0.2, 0.4}}};
     for (int d = 0; d < 3; d++) {
-        bst_od_observation list[4];
-        memcpy(list, arc, sizeof arc);
+        bst_od_observation list[4] = {arc[0], arc[1], arc[2], arc[3]};
         bst_arc_drop(list, 4, drops[d].index);
         for (int i = 0; i < 3; i++) {
             bst_assert_close(list[i].cov_11, drops[d].left[i], 0.0);
@@ -545,8 +587,11 @@ static void outliers_of_an_arc(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_observation),         cmocka_unit_test(directions_that_share_errors),
-        cmocka_unit_test(covariances_of_a_filter), cmocka_unit_test(place_and_its_deviation),
+        cmocka_unit_test(one_observation),
+        cmocka_unit_test(directions_that_share_errors),
+        cmocka_unit_test(directions_of_another_object),
+        cmocka_unit_test(covariances_of_a_filter),
+        cmocka_unit_test(place_and_its_deviation),
         cmocka_unit_test(outliers_of_an_arc),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
