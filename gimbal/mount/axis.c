@@ -49,7 +49,6 @@ void bst_axis_archive(bst_axis *axis, bst_archive *archive) {
     BST_ARCHIVE(archive, axis->reference_radps);
     BST_ARCHIVE(archive, axis->angle_rad);
     BST_ARCHIVE(archive, axis->rate_radps);
-    BST_ARCHIVE(archive, axis->accel_radps2);
     bst_archive_bool(archive, &axis->limited);
 }
 
@@ -101,7 +100,6 @@ void bst_axis_step(bst_axis *axis, double target_rad, double target_radps, doubl
         }
         rate = allowed;
     }
-    axis->accel_radps2 = (rate - axis->rate_radps) / h;
     axis->angle_rad = angle;
     axis->rate_radps = rate;
 }

@@ -19,7 +19,6 @@ typedef struct bst_axis {
     double phi[2][2], gamma[2];
     double reference_rad, reference_radps; /* shaped */
     double angle_rad, rate_radps;          /* true; angle is not wrapped */
-    double accel_radps2;                   /* mean over the last step */
     bool limited;                          /* the last step reached a limit */
 } bst_axis;
 

@@ -254,12 +254,17 @@ typedef struct scene {
     const bst_orbit_selection *selection; /* of objects */
 } scene;
 
+/* Time between states, s: by default a twentieth of the run, at most a minute. */
+static double step_of(const bst_export *e, double span_s) {
+    return e->step_s > 0.0 ? e->step_s : fmin(60.0, span_s / 20.0);
+}
+
 static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const scene *in, FILE *stream,
                                int *written) {
     const bst_scenario *scenario = in->scenario;
     track t = {
         .view = in->view, .world = in->world, .sensor = -1, .span_s = recorded_s(e->run, scenario)};
-    t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
+    t.step_s = step_of(e, t.span_s);
     if (!(t.span_s > 0.0)) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no time span to write orbits for",
                         bst_run_reader_folder(e->run));
@@ -294,7 +299,7 @@ static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const scene 
     bst_run_sensor sensors[BST_EXPORT_SENSORS];
     char created[32];
     int count;
-    t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
+    t.step_s = step_of(e, t.span_s);
     if (!(t.span_s > 0.0)) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no time span to write orbits for",
                         bst_run_reader_folder(e->run));

@@ -291,6 +291,79 @@ static void a_box_from_eight_sides(void **state) {
     bst_test_model_close(&m);
 }
 
+#define TWO_BOXES                                                                                  \
+    "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}], \"parts\": [{\"name\": \"a\", "        \
+    "\"kind\": \"box\", \"size_m\": [0.2, 2, 3], \"position_m\": [-0.6, 0.1, 0.2], \"material\": " \
+    "\"w\"}, {\"name\": \"b\", \"kind\": \"box\", \"size_m\": [0.3, 0.8, 0.7], \"position_m\": "   \
+    "[0.7, -0.2, 0.3], \"material\": \"w\"}]}"
+
+static const double box_half[2][3] = {{0.1, 1.0, 1.5}, {0.15, 0.4, 0.35}};
+static const double box_at[2][3] = {{-0.6, 0.1, 0.2}, {0.7, -0.2, 0.3}};
+
+/* Distance along a ray to the nearest face of both boxes, and its axis; INFINITY: none. */
+static double trace(bst_vec3 from, bst_vec3 way, int *face) {
+    const double *q = &from.x, *d = &way.x;
+    double best = INFINITY;
+    for (int b = 0; b < 2; b++) {
+        double in = -INFINITY, out = INFINITY;
+        int axis = 0;
+        for (int i = 0; i < 3; i++) {
+            double near = (box_at[b][i] - copysign(box_half[b][i], d[i]) - q[i]) / d[i];
+            double far = (box_at[b][i] + copysign(box_half[b][i], d[i]) - q[i]) / d[i];
+            axis = near > in ? i : axis;
+            in = fmax(in, near);
+            out = fmin(out, far);
+        }
+        if (in < out && out > 0 && in < best) {
+            best = in;
+            *face = axis;
+        }
+    }
+    return best;
+}
+
+/* One box before another, and in its light, pixel by pixel from rays. */
+static void boxes_hide_each_other(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_test_model m = bst_test_model_open(TWO_BOXES);
+    const double up = 20 * BST_DEG_RAD,
+                 scale = 0.48 * SIDE / sqrt(0.7 * 0.7 + 1.1 * 1.1 + 1.7 * 1.7);
+    int seen = 0, dark = 0, wrong = 0;
+    bst_assert_ok(&ctx, bst_turntable_draw(&ctx, m.satellite, "x.png", SIDE));
+    for (int k = 0; k < 8; k++) {
+        const double a = k * 45 * BST_DEG_RAD;
+        const bst_vec3 eye = {cos(up) * cos(a), cos(up) * sin(a), sin(up)},
+                       right = {-sin(a), cos(a), 0},
+                       above = {-sin(up) * cos(a), -sin(up) * sin(a), cos(up)};
+        const bst_vec3 sun =
+            bst_vec3_unit(bst_vec3_axpy(bst_vec3_axpy(eye, 0.6, right), 0.45, above));
+        for (int y = 0; y < SIDE; y++) {
+            for (int x = 0; x < SIDE; x++) {
+                bst_vec3 q = bst_vec3_scale(right, (x + 0.5 - 0.5 * SIDE) / scale);
+                q = bst_vec3_axpy(q, (0.5 * SIDE - y - 0.5) / scale, above);
+                q = bst_vec3_axpy(q, 10.0, eye);
+                int axis = 0, other;
+                double expected = 24, way = trace(q, bst_vec3_scale(eye, -1.0), &axis);
+                if (isfinite(way)) {
+                    const bst_vec3 hit = bst_vec3_axpy(bst_vec3_axpy(q, -way, eye), 1e-6, sun);
+                    const double side = copysign(1.0, (&eye.x)[axis]);
+                    const double in = side * (&sun.x)[axis];
+                    const bool lit = in > 0 && !isfinite(trace(hit, sun, &other));
+                    expected = 32 + 223 * cbrt(lit ? 0.8 * in : 0.02 * 0.8);
+                    seen++;
+                    dark += in > 0 && !lit;
+                }
+                wrong += fabs(sheet[k / 4 * SIDE + y][k % 4 * SIDE + x] - expected) > 1.5;
+            }
+        }
+    }
+    print_message("%d pixels, %d of them in a shadow, %d unlike\n", seen, dark, wrong);
+    assert_true(dark > seen / 50);
+    assert_true(wrong < seen / 500); /* rounding at edges */
+    bst_test_model_close(&m);
+}
+
 static uint32_t word_at(const uint8_t *bytes) {
     return bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
 }
@@ -370,6 +443,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(from_an_orbit, set_up, tear_down),
         cmocka_unit_test_setup_teardown(from_a_site, set_up, tear_down),
         cmocka_unit_test(a_box_from_eight_sides),
+        cmocka_unit_test(boxes_hide_each_other),
         cmocka_unit_test(a_box_as_glb),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -306,13 +306,14 @@ static void a_short_burn_is_an_impulse_in_the_limit(void **state) {
 static void burns_are_undone_on_the_way_back(void **state) {
     (void)state;
     orbit_state start = conic(7e6, 0.01, 0.9, 0.3);
-    const bst_astro_thrust burns[4] = {{500, 0, {10, -20, 30}},
+    const bst_astro_thrust burns[5] = {{500, 0, {10, -20, 30}},
+                                       {500, 0, {-7, 40, 90}}, /* in the axes after the first */
                                        {1000, 300, {5, 6, -7}},
                                        {2000, 0, {0, -16000, 50}}, /* turns the orbit round */
                                        {2500, 0, {-3, 2, 1}}};
-    bst_trajectory *t = two_body(0, start, burns, 4);
+    bst_trajectory *t = two_body(0, start, burns, 5);
     for (double from = 450; from < 3000; from += 800) {
-        bst_trajectory *back = two_body(from, at(t, from), burns, 4);
+        bst_trajectory *back = two_body(from, at(t, from), burns, 5);
         for (double seconds = 0; seconds < 3000; seconds += 100) {
             if (seconds > from && from < 2000) {
                 continue; /* and forward again, checked by the others */

@@ -58,12 +58,14 @@ static mount make_mount(double rate_radps) {
  * L) / gain; exposures average what grows evenly to its middle. */
 static void frames_show_more_and_later(void **state) {
     (void)state;
-    const double gains[] = {1.3, 1.0, 0.8}, lates[] = {0.04, 0.03, 0.0};
+    const double gains[] = {1.3, 1.0, 0.8}, lates[] = {0.04, 0.0313, 0.0};
+    /* of the second, neither end is at a sample of telemetry */
+    const double exposures_s[] = {0.06, 0.0534, 0.06};
     for (int k = 0; k < 3; k++) {
         const double g = gains[k], late = lates[k], v = 2e-5;
         const bst_model_error_env env = {.gain = g,
                                          .late_s = late,
-                                         .exposure_s = 0.06,
+                                         .exposure_s = exposures_s[k],
                                          .latency_s = 0.05,
                                          .tick_rate_hz = TICKS,
                                          .jump_rad = 1e-3};

@@ -362,6 +362,8 @@ class Exported(unittest.TestCase):
         (_, states), = read_oem(out + "/observers.oem")
         self.assertEqual((seconds(states[0][0], self.epoch), seconds(states[-1][0], self.epoch)),
                          (0, 28))
+        for i, (utc, _) in enumerate(states):  # without --step: twenty steps, at most a minute each
+            self.assertAlmostEqual(seconds(utc, self.epoch), 1.4 * i, delta=1e-6)
         with open(out + "/observations.json", encoding="utf-8") as file:
             items = json.load(file)
         with open(out + "/observations.csv", newline="", encoding="utf-8") as file:

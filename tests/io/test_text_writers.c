@@ -129,6 +129,42 @@ static bst_status line_row(void *user, bst_ctx *ctx, int64_t row, bst_time *t, b
     return BST_OK;
 }
 
+/* The lower triangle by rows, in km^2, km^2/s and km^2/s^2 (CCSDS 502.0-B-3, 5.2.5). */
+static void covariances_are_in_kilometres(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    char *buffer = NULL;
+    size_t bytes = 0;
+    double step_s = 0.5;
+    FILE *stream = open_memstream(&buffer, &bytes);
+    bst_oem_covariance covariance = {.epoch = utc("2016-12-31T12:00:00Z")};
+    for (int i = 0; i < 6; i++) {
+        for (int k = 0; k < 6; k++) {
+            covariance.matrix[i][k] = k <= i ? 1e6 * (10.0 * i + k + 1.0) : NAN; /* m */
+        }
+    }
+    const bst_oem_segment segment = {.object_name = "A",
+                                     .object_id = "1",
+                                     .ref_frame = "GCRF",
+                                     .series = {1, line_row, &step_s},
+                                     .covariance = &covariance};
+    bst_assert_ok(&ctx, bst_oem_write_segment(&ctx, stream, &segment));
+    char *text = text_of(stream, &buffer), *at = strstr(text, "COVARIANCE_START");
+    const char *heading =
+        "COVARIANCE_START\nEPOCH = 2016-12-31T12:00:00.000\nCOV_REF_FRAME = GCRF\n";
+    assert_non_null(at);
+    assert_int_equal(strncmp(at, heading, strlen(heading)), 0);
+    at += strlen(heading);
+    for (int i = 0; i < 6; i++) {
+        for (int k = 0; k <= i; k++) {
+            bst_assert_close(strtod(at, &at), 10.0 * i + k + 1.0, 1e-9);
+            assert_int_equal(*at, k < i ? ' ' : '\n');
+        }
+    }
+    assert_string_equal(at, "\nCOVARIANCE_STOP\n");
+    free(text);
+}
+
 static void times_pass_a_leap_second(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -334,6 +370,7 @@ static void an_omm_has_degrees_and_revolutions(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_oem_of_our_own_comes_back),
+        cmocka_unit_test(covariances_are_in_kilometres),
         cmocka_unit_test(times_pass_a_leap_second),
         cmocka_unit_test(czml_is_what_cesium_reads),
         cmocka_unit_test(tdm_states_its_corrections),

@@ -100,14 +100,23 @@ def split_parameters(text):
     return parts + [now]
 
 
+def in_context(path, text, at, old, new):
+    """A bug as mutate.py --bugs reads it: with so many lines about it that the text occurs once in its file."""
+    first, last = text.rfind("\n", 0, at) + 1, text.index("\n", at + len(old))
+    while text.count(text[first:last]) > 1:
+        first, last = text.rfind("\n", 0, max(first - 1, 0)) + 1, text.index("\n", last + 1)
+    return {"file": path, "old": text[first:last], "new": text[first:at] + new + text[at + len(old):last]}
+
+
 class Library:
     """A library of the build with the bugs in it, in a scratch folder."""
 
     def __init__(self, tree, folder, rng, each, scratch):
         self.tree, self.scratch, self.functions, self.texts = tree, scratch, [], {}
+        self.listed = {}  # number of a bug: as mutate.py --bugs reads it
         listed = build_files.run(["git", "-C", tree.folder, "ls-files", "--", folder]).stdout.split("\n")
         for path in listed:
-            if path.endswith(".c") and not WITHOUT_FORMULAS.match(path):
+            if path.endswith(".c") and (WITHOUT_FORMULAS.match(folder + "/") or not WITHOUT_FORMULAS.match(path)):
                 self.plant(path, rng, each)
         if not self.functions:
             sys.exit(f"every_function: no function with formulas in {folder}")
@@ -129,6 +138,7 @@ class Library:
             for kind in rng.sample(kinds := sorted({m[0] for m in inside}), min(each, len(kinds))):
                 _, at, old, new = rng.choice([m for m in inside if m[0] == kind])
                 number = sum(len(g.bugs) for g in self.functions) + len(f.bugs) + 1
+                self.listed[number] = in_context(path, text, at, old, new)
                 line = text.count("\n", 0, at) + 1
                 f.bugs.append((number, f"{path}:{line} {f.name}: {kind} '{old}' -> '{new}' [{text.split(chr(10))[line - 1].strip()}]",
                                text[first:at] + new + text[at + len(old):last]))
@@ -254,6 +264,7 @@ def main():
     parser.add_argument("--longest", type=float, default=2.0, metavar="SECONDS", help="leave out tests that need more (default 2)")
     parser.add_argument("--budget", type=float, default=6.0, metavar="SECONDS", help="of tests for each bug (default 6)")
     parser.add_argument("--json", help="file for the outcomes")
+    parser.add_argument("--survivors", help="file for those that survived, a list for mutate.py --bugs: --suite e2e judges them")
     options = parser.parse_args()
     tree = QuickTree(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), options.build, 2)
     scratch = tempfile.mkdtemp(prefix="boresight-every-")
@@ -261,6 +272,7 @@ def main():
         library = Library(tree, options.folder, random.Random(options.seed), options.each, scratch)
         library.compile()
         names = tree.judges_of(library.functions[0].path, "unit")
+        tree.make(*sorted({tree.program_of(name) for name in names}))
         with ThreadPoolExecutor(2) as pool:
             tests = list(filter(None, pool.map(lambda n: enter(tree, library, n, options.longest, scratch), names)))
         tests.sort(key=lambda t: t[2])
@@ -290,6 +302,10 @@ def main():
         if options.json:
             with open(options.json, "w", encoding="utf-8") as file:
                 json.dump(outcomes, file, indent=1)
+        if options.survivors:
+            left = [library.listed[n] for n, o in zip(sorted(library.bugs), outcomes) if o[0] == "survived"]
+            with open(options.survivors, "w", encoding="utf-8") as file:
+                json.dump(left, file, indent=1)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     return 0

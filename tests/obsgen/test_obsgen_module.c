@@ -31,6 +31,9 @@ static struct {
     bst_identify_options options;
     bool identified;
     char counted[64];
+    const struct bst_psf *psf; /* on board */
+    bst_response response;
+    bst_crlb_table image_bound, onboard_bound;
 } m;
 
 static const bst_quat q0 = {0.3 / 0.93273790530888, -0.5 / 0.93273790530888, 0.2 / 0.93273790530888,
@@ -65,7 +68,7 @@ WRAP(const bst_camera *, bst_knowledge_camera, (const bst_knowledge *knowledge))
 
 WRAP(const struct bst_psf *, bst_knowledge_psf, (const bst_knowledge *knowledge)) {
     (void)knowledge;
-    return NULL;
+    return m.psf;
 }
 
 WRAP(const bst_stars *, bst_knowledge_stars, (const bst_knowledge *knowledge)) {
@@ -139,7 +142,7 @@ WRAP(bst_status, bst_field_query,
     truth->boresight_x_px = truth->boresight_y_px = 1.0;
     truth->lost = truth->count = truth->shape_count = 0;
     bst_assert_close(options->ghost_sigma, 0.05, 0.0); /* as in scenegen by default */
-    assert_int_equal(options->binning, 2);
+    assert_int_equal(options->binning, m.exposure.binning);
     static bst_scene_source seen[ITEMS];
     seen[ITEMS - 2].ghost = &m.camera.ghost_images->items[1];
     *sources = seen;
@@ -155,7 +158,16 @@ WRAP(bst_status, bst_truth_list_fill,
     list->source_of = list->source_of ? list->source_of : calloc(ITEMS, sizeof(int));
     assert_non_null(list->source_of);
     assert_int_equal(request->count, ITEMS);
-    assert_int_equal(request->binning, 2);
+    assert_int_equal(request->binning, m.exposure.binning);
+    /* the brightest pixel of a Gaussian at its middle; the source before the last is a ghost, whose
+     * blur widens it */
+    const bst_truth_item still = {.electrons = 1000.0};
+    const double own = 2.0 / 2.3548200450309493, widths[2] = {own, hypot(own, 1.5)};
+    for (int k = 0; k < 2; k++) {
+        double share = erf(0.5 / (widths[k] * sqrt(2.0)));
+        bst_assert_close(request->peak_e(request->user, ITEMS - 1 - k, &still),
+                         1000.0 * share * share, 1e-3);
+    }
     assert_true(capacity >= ITEMS);
     truth->count = ITEMS;
     for (int i = 0; i < ITEMS; i++) {
@@ -174,6 +186,11 @@ WRAP(bst_status, bst_generator_run,
     (void)ctx;
     (void)g;
     m.frame = *frame;
+    if (frame->response) {
+        m.response = *frame->response;
+        m.image_bound = *frame->image_bound;
+        m.onboard_bound = *frame->onboard_bound;
+    }
     for (int i = 0; i < ITEMS; i++) { /* the source before the last is the second item */
         assert_int_equal(frame->ghost[i], i == 1 ? 1 : -1);
     }
@@ -284,8 +301,14 @@ static void set_key(void *config, const char *key, double real, int64_t whole) {
     fail_msg("there is no key %s", key);
 }
 
-/* Runs one exposure through a module of its own. */
-static void run(void) {
+typedef struct filters {
+    bst_response response;
+    bst_crlb_table image_bound, onboard_bound;
+} filters;
+
+/* Runs exposures of these binnings through a module of their own, and keeps what the generator got.
+ */
+static void run_binned(const int *binnings, int count, filters *got) {
     void *config = calloc(1, bst_obsgen_module.config_bytes), *self;
     const bst_module_env env = {.ctx = &m.ctx,
                                 .instance = "a/b/obsgen",
@@ -304,10 +327,25 @@ static void run(void) {
     set_key(config, "search_radius_px", 55.0, 0);
     set_key(config, "match_tolerance_px", 2.5, 0);
     bst_assert_ok(&m.ctx, bst_obsgen_module.create(&env, config, &self));
-    bst_assert_ok(&m.ctx, bst_obsgen_module.step(self, NULL));
+    for (int i = 0; i < count; i++) {
+        m.exposure.binning = binnings[i];
+        m.exposure.id++;
+        m.exposed = m.processed = false;
+        memset(&m.response, 0, sizeof m.response);
+        bst_assert_ok(&m.ctx, bst_obsgen_module.step(self, NULL));
+        if (got) {
+            got[i] = (filters){m.response, m.image_bound, m.onboard_bound};
+        }
+    }
     m.frame.truth = NULL; /* the module's */
     bst_obsgen_module.destroy(self);
     free(config);
+}
+
+/* Runs one exposure through a module of its own. */
+static void run(void) {
+    const int binning = m.exposure.binning;
+    run_binned(&binning, 1, NULL);
 }
 
 static void begin(void) {
@@ -331,9 +369,10 @@ static void begin(void) {
     two = two ? two : calloc(1, sizeof *two + 2 * sizeof two->items[0]);
     assert_non_null(two);
     two->count = 2;
+    two->items[1].sigma_px = 1.5;
     m.camera.ghost_images = two;
     m.exposure = (bst_exposure){
-        .id = 4, .start_tick = START, .end_tick = END, .window = {40, 20, 300, 200}, .binning = 2};
+        .id = 3, .start_tick = START, .end_tick = END, .window = {40, 20, 300, 200}, .binning = 2};
     m.truth = calloc(1, sizeof *m.truth + 100 * sizeof m.truth->items[0]);
     m.detections = calloc(1, sizeof *m.detections + 100 * sizeof m.detections->items[0]);
     m.pointing = calloc(1, sizeof *m.pointing + 30 * sizeof m.pointing->items[0]);
@@ -490,6 +529,40 @@ static void what_is_published(void **state) {
     assert_int_equal(m.truth->count, ITEMS);
 }
 
+/* An exposure gets the filters of its own binning, whatever was binned before. */
+static void filters_are_of_the_binning(void **state) {
+    (void)state;
+    begin();
+    bst_psf *psf;
+    bst_camera onboard = m.camera;
+    onboard.ghost_images = NULL;
+    onboard.optics.psf = BST_PSF_DIFFRACTION;
+    onboard.optics.q = 2.0;
+    onboard.optics.band_nm[0] = 600.0;
+    onboard.optics.band_nm[1] = 601.0;
+    onboard.optics.wavelengths = 1;
+    bst_assert_ok(&m.ctx, bst_psf_create(&m.ctx, &onboard, &psf));
+    m.psf = psf;
+    static filters alone[2], mixed[3];
+    static const int order[3] = {1, 2, 1};
+    run_binned(order, 1, &alone[0]);
+    run_binned(order + 1, 1, &alone[1]);
+    run_binned(order, 3, mixed);
+    assert_true(alone[0].image_bound.along[0][0] != alone[1].image_bound.along[0][0] &&
+                alone[0].onboard_bound.along[0][0] != alone[1].onboard_bound.along[0][0]);
+    for (int i = 0; i < 3; i++) {
+        const filters *wanted = &alone[order[i] - 1];
+        assert_memory_equal(mixed[i].image_bound.along, wanted->image_bound.along,
+                            sizeof wanted->image_bound.along);
+        assert_memory_equal(mixed[i].onboard_bound.along, wanted->onboard_bound.along,
+                            sizeof wanted->onboard_bound.along);
+        assert_true(mixed[i].response.both.across_px == wanted->response.both.across_px);
+        assert_true(mixed[i].response.filter.along_px == wanted->response.filter.along_px);
+    }
+    m.psf = NULL;
+    bst_psf_free(psf);
+}
+
 static void without_telemetry_no_star_is_identified(void **state) {
     (void)state;
     begin();
@@ -513,6 +586,7 @@ int main(void) {
         cmocka_unit_test(generator_gets_the_exposure),
         cmocka_unit_test(path_is_that_of_a_star_at_the_windows_middle),
         cmocka_unit_test(what_is_published),
+        cmocka_unit_test(filters_are_of_the_binning),
         cmocka_unit_test(without_telemetry_no_star_is_identified),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

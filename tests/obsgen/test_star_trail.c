@@ -178,6 +178,34 @@ static void the_way_has_the_light_of_the_path(void **state) {
     bst_assert_close(on, line, 1e-3 * line + 1e-5);
 }
 
+/* The nodes of an even, straight path are on it, at the place of their time, up to its very ends,
+ * where only steps to one side are near. */
+static void the_way_of_an_even_path_is_the_path(void **state) {
+    (void)state;
+    static path p;
+    static bst_star_trail_node nodes[BST_ROUTE_NODES];
+    const double dx = 23.0, dy = -14.0;
+    for (int k = 0; k < STEPS; k++) {
+        double u = (double)k / (STEPS - 1) - 0.5;
+        p.x[k] = dx * u;
+        p.y[k] = dy * u;
+    }
+    const bst_star_trail_path route = route_of(&p);
+    int count = bst_star_trail_lay(&route, 1.1, nodes), on = 0;
+    for (int i = 0; i < count; i++) {
+        if (nodes[i].time > 0.0 && nodes[i].time < 1.0) {
+            on++;
+            /* nodes are even between two steps of the path, a fifteenth of a pixel apart */
+            bst_assert_close(nodes[i].x, dx * (nodes[i].time - 0.5), 1e-9);
+            bst_assert_close(nodes[i].y, dy * (nodes[i].time - 0.5), 1e-9);
+        }
+    }
+    assert_true(on > 20);
+    /* light beyond the ends is half of that at them and falls off */
+    assert_true(nodes[0].time == 0.0 && nodes[count - 1].time == 1.0);
+    assert_true(nodes[0].x < -0.5 * dx - 1.1 && nodes[count - 1].y < 0.5 * dy - 1.1);
+}
+
 static void the_way_of_a_trembling_camera_is_the_ridge_of_the_light(void **state) {
     (void)state;
     static bst_star_trail_node nodes[BST_ROUTE_NODES];
@@ -211,6 +239,7 @@ int main(void) {
         cmocka_unit_test(fits_land_where_the_light_overlaps_most),
         cmocka_unit_test(bright_points_land_nearer_to_the_centroid),
         cmocka_unit_test(the_way_has_the_light_of_the_path),
+        cmocka_unit_test(the_way_of_an_even_path_is_the_path),
         cmocka_unit_test(the_way_of_a_trembling_camera_is_the_ridge_of_the_light),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -22,6 +22,38 @@ bool __wrap_bst_custody_update(const bst_custody_orbit *orbit, const bst_custody
     return !updates_fail && __real_bst_custody_update(orbit, z, filter);
 }
 
+/* What observations of object 44802 are predicted to be, in place of a prediction; and the
+ * photocentres of all objects. */
+static const bst_custody_prediction *predicted;
+static double photocentres_m[8];
+static int photocentre_count;
+
+bool __real_bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                                const bst_custody_observation *z, bst_custody_prediction *out);
+bool __wrap_bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                                const bst_custody_observation *z, bst_custody_prediction *out);
+bool __wrap_bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                                const bst_custody_observation *z, bst_custody_prediction *out) {
+    if (predicted && orbit->elements.norad == 44802) {
+        *out = *predicted;
+        return true;
+    }
+    return __real_bst_custody_predict(orbit, filter, z, out);
+}
+
+bst_status __real_bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements,
+                                         double offset_s, double photocentre_m,
+                                         bst_custody_orbit *out);
+bst_status __wrap_bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements,
+                                         double offset_s, double photocentre_m,
+                                         bst_custody_orbit *out);
+bst_status __wrap_bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements,
+                                         double offset_s, double photocentre_m,
+                                         bst_custody_orbit *out) {
+    photocentres_m[photocentre_count++ % 8] = photocentre_m;
+    return __real_bst_custody_orbit_init(ctx, elements, offset_s, photocentre_m, out);
+}
+
 /* A scenario that records custody. */
 #define SCENARIO(seed_of_errors, run_number)                    \
     ((bst_scenario){.seed = (seed_of_errors),                   \
@@ -366,48 +398,89 @@ static void a_failed_update_is_counted(void **state) {
     bst_world_free(world);
 }
 
+/* GX5, called A, of 12 m^2, and C, with a mean anomaly of its own; B of another file is not there.
+ */
+static bst_world *world_with_neighbour(const scratch *place, const char *anomaly) {
+    char text[256], objects[2048], line[70];
+    snprintf(line, sizeof line, "2 44802   0.0366 343.6423 0001933 100.2390 %s  1.00270919  944",
+             anomaly);
+    int sum = 0;
+    for (const char *c = line; *c; c++) {
+        sum += *c >= '0' && *c <= '9' ? *c - '0' : 0;
+    }
+    snprintf(text, sizeof text,
+             "1 44802U 19080B   22167.00079919  .00000075  00000+0  00000+0 0  9999\n%s%d\n", line,
+             sum % 10);
+    scratch at = *place;
+    FILE *file = fopen(scratch_path(&at, "near.tle"), "w");
+    assert_non_null(file);
+    fputs(text, file);
+    fclose(file);
+    snprintf(objects, sizeof objects,
+             "{\"name\": \"A\", \"area_m2\": 12, " TEST_GX5
+             "}, {\"name\": \"C\", \"orbit\": {\"elements_file\": \"%s\", \"norad\": 44802}}",
+             scratch_path(&at, "near.tle"));
+    return test_world_with(objects, "");
+}
+
+/* What becomes of one track of A. */
+static bst_custody_figures figures_of_a(const bst_world *world) {
+    bst_ctx ctx = {0};
+    bst_scenario scenario = SCENARIO(5, 0);
+    scenario.record.custody_sigma_m = 20;
+    scenario.record.custody_drift_m_per_day = 20;
+    bst_run_custody *c;
+    bst_custody_figures f;
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &scenario, NULL, &c));
+    take(&ctx, c, world, 0, 1, 9, 100.0, 0.0);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 500.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    bst_run_custody_free(c);
+    return f;
+}
+
 /* A track beside which a second object is predicted, outside of the gate but nearer than two images
  * can be separated, updates none. */
 static void neighbours_are_ambiguous(void **state) {
     (void)state;
-    bst_ctx ctx = {0};
     scratch place;
     scratch_make(&place);
-    /* GX5, and objects 0.001 degrees (4 arcsec, 0.7 of a FWHM) and 0.01 degrees beside it */
+    /* 0.001 degrees (4 arcsec, 0.7 of a FWHM) and 0.01 degrees beside GX5 */
     const char *anomalies[2] = {"191.6451", "191.6541"};
     for (int n = 0; n < 2; n++) {
-        char text[256], objects[2048], line[70];
-        snprintf(line, sizeof line,
-                 "2 44802   0.0366 343.6423 0001933 100.2390 %s  1.00270919  944", anomalies[n]);
-        int sum = 0;
-        for (const char *c = line; *c; c++) {
-            sum += *c >= '0' && *c <= '9' ? *c - '0' : 0;
-        }
-        snprintf(text, sizeof text,
-                 "1 44802U 19080B   22167.00079919  .00000075  00000+0  00000+0 0  9999\n%s%d\n",
-                 line, sum % 10);
-        FILE *file = fopen(scratch_path(&place, "near.tle"), "w");
-        assert_non_null(file);
-        fputs(text, file);
-        fclose(file);
-        snprintf(objects, sizeof objects,
-                 "{\"name\": \"A\", " TEST_GX5
-                 "}, {\"name\": \"C\", \"orbit\": {\"elements_file\": \"%s\", \"norad\": 44802}}",
-                 scratch_path(&place, "near.tle"));
-        bst_world *world = test_world_with(objects, "");
-        bst_scenario scenario = SCENARIO(5, 0);
-        scenario.record.custody_sigma_m = 20;
-        scenario.record.custody_drift_m_per_day = 20;
-        bst_run_custody *c;
-        bst_custody_figures f;
-        bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &scenario, NULL, &c));
-        take(&ctx, c, world, 0, 1, 9, 100.0, 0.0);
-        bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 500.0));
-        assert_true(bst_run_custody_figures(c, &f));
+        bst_world *world = world_with_neighbour(&place, anomalies[n]);
+        bst_custody_figures f = figures_of_a(world);
         assert_true(f.tracks == 1 && f.ambiguous == (n == 0) && f.correlated == (n == 1));
-        bst_run_custody_free(c);
         bst_world_free(world);
     }
+    scratch_remove(&place);
+}
+
+/* The limit of it: one FWHM and two standard deviations over both axes, at most two FWHM. */
+static void neighbours_by_their_uncertainty(void **state) {
+    (void)state;
+    scratch place;
+    scratch_make(&place);
+    bst_world *world = world_with_neighbour(&place, "191.6451");
+    const bst_camera *camera = bst_world_camera(world, 0, 0);
+    const double fwhm = camera->psf_fwhm_px * camera->pixel_scale_arcsec * BST_ARCSEC_RAD;
+    const double sigmas[3][2] = {{0.1, 0.3}, {0.3, 0.1}, {0.2, 0.6}};
+    for (int k = 0; k < 6; k++) {
+        const double *s = sigmas[k / 2], limit = 1.0 + fmin(2.0 * hypot(s[0], s[1]), 1.0);
+        const double d = fwhm * limit * (k % 2 ? 1.01 : 0.99);
+        bst_custody_prediction p = {.innovation = {0.6 * d, -0.8 * d}, .chi2 = 1e3};
+        p.covariance[0][0] = pow(s[0] * fwhm, 2.0);
+        p.covariance[1][1] = pow(s[1] * fwhm, 2.0);
+        p.covariance[0][1] = p.covariance[1][0] = -0.5 * s[0] * s[1] * fwhm * fwhm;
+        predicted = &p;
+        photocentre_count = 0;
+        bst_custody_figures f = figures_of_a(world);
+        predicted = NULL;
+        assert_true(f.tracks == 1 && f.ambiguous == (k % 2 == 0) && f.correlated == (k % 2));
+        /* half of the radius of a disc of this area */
+        bst_assert_close(photocentres_m[0], 0.5 * sqrt(12.0 / BST_PI), 1e-12);
+    }
+    bst_world_free(world);
     scratch_remove(&place);
 }
 
@@ -531,6 +604,7 @@ int main(void) {
         cmocka_unit_test(errors_of_the_catalogue),
         cmocka_unit_test(a_failed_update_is_counted),
         cmocka_unit_test(neighbours_are_ambiguous),
+        cmocka_unit_test(neighbours_by_their_uncertainty),
         cmocka_unit_test(directions_update_their_object),
         cmocka_unit_test(unknown_objects_become_candidates),
         cmocka_unit_test(off_and_without_objects),

@@ -131,21 +131,21 @@ static void give_truth(fixture *f, int64_t id, uint32_t flags) {
                                        .id = ids[i],
                                        .flags = i == 1 ? flags : BST_TRUTH_IN_FIELD,
                                        .x_centroid_px = 45.0 + 3 * (i - 1),
-                                       .y_centroid_px = 33.5 - 2 * (i - 1)};
+                                       .y_centroid_px = 43.5 - 2 * (i - 1)};
     }
     give(f, BST_CHANNEL_TRUTH, t);
     test_free(t);
 }
 
-/* A star, one at rest, the target's (faint) and another object, by x = 42, 44, 45.5 and 50. */
+/* A star, one at rest, the target's (faint) and a hit, the last in its column. */
 static void give_detections(fixture *f, int64_t id) {
     bst_detections *d = test_calloc(1, sizeof *d + 4 * sizeof d->items[0]);
     *d = (bst_detections){.exposure_id = id, .count = 4};
     d->items[0] = (bst_detection){
         .x_px = 30, .y_px = 31, .flux_e = 500, .label = BST_LABEL_STAR, .star_id = 9};
     d->items[1] = (bst_detection){.x_px = 54, .y_px = 37, .flux_e = 900, .label = BST_LABEL_STAR};
-    d->items[2] = (bst_detection){.x_px = 45.5, .y_px = 34, .flux_e = 5, .label = BST_LABEL_OBJECT};
-    d->items[3] = (bst_detection){.x_px = 51, .y_px = 36, .flux_e = 700, .label = BST_LABEL_HIT};
+    d->items[2] = (bst_detection){.x_px = 45.5, .y_px = 44, .flux_e = 5, .label = BST_LABEL_OBJECT};
+    d->items[3] = (bst_detection){.x_px = 46, .y_px = 36, .flux_e = 700, .label = BST_LABEL_HIT};
     give(f, BST_CHANNEL_DETECTIONS, d);
     test_free(d);
 }
@@ -194,7 +194,7 @@ static void expect_picture(int at, int64_t id, int binning, const char *mode) {
     assert_non_null(strstr(labels[at][0], text));
     assert_true(q->has_target && q->has_track);
     bst_assert_close(q->target_x_px, column(45.0, binning), 1e-12);
-    bst_assert_close(q->target_y_px, row(33.5, binning), 1e-12);
+    bst_assert_close(q->target_y_px, row(43.5, binning), 1e-12);
     bst_assert_close(q->track_x_px, column(46, binning), 1e-12);
     bst_assert_close(q->track_y_px, row(35, binning), 1e-12);
     snprintf(text, sizeof text, "track %d  SNR %.1f", (int)(70 + id), 12.25);
@@ -203,7 +203,7 @@ static void expect_picture(int at, int64_t id, int binning, const char *mode) {
     bst_assert_close(q->boresight_y_px, row(49.5, binning), 1e-12);
     bst_assert_close(q->pixel_scale_arcsec, 2.5 * binning, 1e-12);
     /* the target's first, then by brightness */
-    static const double places[4][2] = {{45.5, 34}, {54, 37}, {51, 36}, {30, 31}};
+    static const double places[4][2] = {{45.5, 44}, {54, 37}, {46, 36}, {30, 31}};
     static const int kinds[4] = {BST_MARK_DETECTION, BST_MARK_REST, BST_MARK_DETECTION,
                                  BST_MARK_STAR};
     assert_int_equal(q->detection_count, 4);

@@ -88,6 +88,17 @@ static void rows_and_pauses(void **state) {
     bst_assert_ok(&ctx, bst_run_wall_clock_open(&ctx, path, false, 2.0, &clock));
     bst_assert_ok(&ctx, bst_run_wall_clock_close(&ctx, clock, 2.0));
     assert_int_equal(read_back(path, rows), 1);
+
+    /* each kept row keeps both of its numbers, and the clock goes on from the last one's */
+    file = fopen(path, "w");
+    assert_non_null(file);
+    fputs("time_s,wall_s\n0,0\n10,2.5\n20,4\n30,90\n", file);
+    fclose(file);
+    bst_assert_ok(&ctx, bst_run_wall_clock_open(&ctx, path, true, 25.0, &clock));
+    bst_assert_ok(&ctx, bst_run_wall_clock_close(&ctx, clock, 40.0));
+    static const double kept[5][2] = {{0, 0}, {10, 2.5}, {20, 4}, {25, 4}, {40, 4}};
+    assert_int_equal(read_back(path, rows), 5);
+    assert_memory_equal(rows, kept, sizeof kept);
     unlink(path);
 
     assert_int_equal(bst_run_wall_clock_open(&ctx, "/tmp/no/such/folder", false, 0.0, &clock),

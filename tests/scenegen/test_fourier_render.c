@@ -261,9 +261,11 @@ static void windows_show_the_same_light(void **state) {
     scene_track track = straight(&c, 9.0);
     bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &c, NULL, &r));
     render(f, r, whole(&c), &track.track, stars, STARS, image);
-    const bst_window windows[6] = {{8, 70, 1, 1},    {95, 0, 1, 1},  {0, 0, 17, 9},
-                                   {60, 11, 33, 40}, {5, 3, 91, 77}, {0, 79, 96, 1}};
-    for (int k = 0; k < 6; k++) { /* more sizes than are kept ready */
+    /* more sizes than are kept ready; the last ones share one side with the one before */
+    const bst_window windows[9] = {{8, 70, 1, 1},    {95, 0, 1, 1},    {0, 0, 17, 9},
+                                   {60, 11, 33, 40}, {5, 3, 91, 77},   {0, 79, 96, 1},
+                                   {40, 30, 24, 24}, {40, 30, 24, 41}, {40, 30, 11, 24}};
+    for (int k = 0; k < 9; k++) {
         bst_window w = windows[k];
         render(f, r, w, &track.track, stars, STARS, part);
         for (int y = 0; y < w.height; y++) {

@@ -247,6 +247,89 @@ static void test_shards_that_gain_nothing(void **state) {
     assert_non_null(strstr(outcome.why, "none of its rows could be read"));
 }
 
+/* An executor whose runs take 0.4 s and 0.6 s in turns, as its rows say. */
+typedef struct timed_executor {
+    fixture *f;
+    bst_study_shard_job job;
+    int64_t sizes[RUNS];
+    int count;
+    bool busy;
+} timed_executor;
+
+static int64_t timed_room(void *self) {
+    const timed_executor *e = self;
+    return e->busy ? 0 : 1;
+}
+
+static bst_status timed_start(bst_ctx *ctx, void *self, const bst_study_shard_job *jobs,
+                              int64_t count) {
+    timed_executor *e = self;
+    bst_study_shard_draft draft;
+    assert_int_equal(count, 1);
+    e->busy = true;
+    e->job = jobs[0];
+    e->sizes[e->count++] = jobs[0].count;
+    BST_TRY(bst_study_shard_begin(ctx, &e->f->study, &fake_kind, jobs[0].first, &draft));
+    for (int64_t i = 0; i < jobs[0].count; i++) {
+        const bst_study_result none = {.rows = 0};
+        bst_study_shard_add(&draft, &none, i % 2 ? 0.6 : 0.4, NULL);
+    }
+    return bst_study_shard_publish(ctx, &draft, e->f->folder);
+}
+
+static bst_status timed_poll(bst_ctx *ctx, void *self, int wait_ms, bst_study_shard_news *news,
+                             int room, int *count) {
+    (void)ctx;
+    (void)wait_ms;
+    timed_executor *e = self;
+    *count = e->busy && room > 0;
+    if (*count) {
+        e->busy = false;
+        news[0] = (bst_study_shard_news){
+            .id = e->job.id, .kind = BST_SHARD_ENDED, .runs_done = e->job.count};
+    }
+    return BST_OK;
+}
+
+/* Shards get as many runs as fill their time by the mean of the rows and of what was expected, half
+ * each; towards the end so few that all workers stay busy; one run alone where that measures. */
+static void test_shards_by_time(void **state) {
+    fixture *f = *state;
+    static const struct {
+        double run_s;
+        int parallel;
+        bool probe;
+        int64_t sizes[6];
+    } cases[] = {
+        /* 10 s of 0.25; 0.375; 0.4375; 0.4672 of shards of 26, 22, 21; then 0.48 */
+        {0.25, 0, false, {40, 26, 22, 21, 20, 20}},
+        {0.0, 0, true, {1, 25, 22, 21, 20, 20}},
+        /* a quarter of what is left: 200, 160, 134, 112, 91 */
+        {0.25, 2, false, {40, 26, 22, 21, 20, 18}},
+    };
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        timed_executor timed = {.f = f};
+        bst_executor executor = {.self = &timed,
+                                 .room = timed_room,
+                                 .start = timed_start,
+                                 .poll = timed_poll,
+                                 .cancel = idle_cancel};
+        const bst_driver_options options = {.out = f->folder,
+                                            .kind = &fake_kind,
+                                            .shard_s = 10.0,
+                                            .run_s = cases[c].run_s,
+                                            .parallel = cases[c].parallel,
+                                            .probe = cases[c].probe};
+        forget_rows(f);
+        bst_results_free(&f->results);
+        bst_assert_ok(&f->ctx, bst_results_create(&f->ctx, &f->study, &fake_kind, &f->results));
+        bst_assert_ok(&f->ctx,
+                      bst_driver_run(&f->ctx, &f->results, &executor, &options, &f->outcome));
+        assert_int_equal(f->outcome.done, RUNS);
+        assert_memory_equal(timed.sizes, cases[c].sizes, sizeof cases[c].sizes);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_same_tables, set_up, tear_down),
@@ -254,6 +337,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(test_no_room, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_wrong_shards, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_shards_that_gain_nothing, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_shards_by_time, set_up, tear_down),
     };
     signal(SIGPIPE, SIG_IGN);
     return cmocka_run_group_tests(tests, NULL, NULL);

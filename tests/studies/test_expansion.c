@@ -35,14 +35,14 @@ static void test_grid(void **state) {
     bst_study_value v[8];
     open_study(
         "\"replicates\": 2, \"sweeps\": [{\"axes\": [{\"path\": \"/a\", "
-        "\"values\": [1, 5]}, {\"path\": \"/b/c\", \"from\": 1, \"to\": "
-        "100, \"count\": 3, \"spacing\": \"log\"}]}]",
+        "\"values\": [1, 5]}, {\"path\": \"/b/c\", \"from\": 2, \"to\": "
+        "200, \"count\": 3, \"spacing\": \"log\"}]}]",
         &s);
     assert_int_equal(s.settings, 6);
     assert_int_equal(s.runs, 12);
     assert_string_equal(s.axes[0].name, "a");
     assert_string_equal(s.axes[1].name, "c");
-    const double a[] = {1, 1, 1, 5, 5, 5}, c[] = {1, 10, 100, 1, 10, 100};
+    const double a[] = {1, 1, 1, 5, 5, 5}, c[] = {2, 20, 200, 2, 20, 200};
     for (int64_t run = 0; run < s.runs; run++) {
         bst_study_place place = bst_study_place_of(&s, run);
         assert_int_equal(place.setting, run / 2);
@@ -54,7 +54,7 @@ static void test_grid(void **state) {
         bst_assert_close(v[1].number, c[run / 2], 1e-13 * c[run / 2]);
     }
     values_of(&s, 5, v);
-    assert_true(v[1].number == 100.0);
+    assert_true(v[1].number == 200.0);
     bst_study_close(&s);
 }
 
@@ -267,13 +267,15 @@ static void test_dispersions(void **state) {
     const char *even =
         "{\"path\": \"/b/c\", \"distribution\": \"log_uniform\", \"from\": 0.01, "
         "\"to\": 100}";
+    const char *uniform =
+        "{\"path\": \"/b/list/0\", \"distribution\": \"uniform\", \"from\": 3, \"to\": 9}";
     char body[1024];
-    snprintf(body, sizeof body, "\"replicates\": 4000, \"dispersions\": [%s, %s, %s]", normal,
-             table, even);
+    snprintf(body, sizeof body, "\"replicates\": 4000, \"dispersions\": [%s, %s, %s, %s]", normal,
+             table, even, uniform);
     open_study(body, &s);
     snprintf(body, sizeof body, "\"replicates\": 4000, \"dispersions\": [%s, %s]", even, normal);
     bst_assert_ok(&ctx, fixture_open(&ctx, folder, body, &other));
-    double sum = 0.0, logs = 0.0;
+    double sum = 0.0, logs = 0.0, plain = 0.0, square = 0.0, logs2 = 0.0, plain2 = 0.0;
     int second = 0;
     for (int64_t run = 0; run < 4000; run++) {
         values_of(&s, run, v);
@@ -283,10 +285,20 @@ static void test_dispersions(void **state) {
         assert_true(v[2].number >= 0.01 && v[2].number <= 100.0);
         sum += v[0].number;
         logs += log10(v[2].number);
+        plain += v[3].number;
+        square += pow(v[0].number - 5.0, 2.0);
+        logs2 += pow(log10(v[2].number), 2.0);
+        plain2 += pow(v[3].number - 6.0, 2.0);
         second += strcmp(v[1].json->valuestring, "v") == 0;
     }
-    bst_assert_close(sum / 4000.0, 5.0, 0.15);      /* sigma 1.54 / 63: 6 of them */
-    bst_assert_close(logs / 4000.0, 0.0, 0.11);     /* sigma 1.155 / 63: 6 of them */
+    bst_assert_close(sum / 4000.0, 5.0, 0.15);   /* sigma 1.54 / 63: 6 of them */
+    bst_assert_close(logs / 4000.0, 0.0, 0.11);  /* sigma 1.155 / 63: 6 of them */
+    bst_assert_close(plain / 4000.0, 6.0, 0.17); /* sigma 1.73 / 63: 6 of them */
+    /* variances: of a normal law cut at c = 1.5 sigma, sigma^2 (1 - 2 c phi(c) / (2 Phi(c) - 1));
+     * of even ones, width^2 / 12; 10 %: 6 sigma or more */
+    bst_assert_close(square / 4000.0, 4.0 * 0.5515, 0.22);
+    bst_assert_close(logs2 / 4000.0, 16.0 / 12.0, 0.13);
+    bst_assert_close(plain2 / 4000.0, 36.0 / 12.0, 0.3);
     bst_assert_close(second / 4000.0, 0.75, 0.041); /* 6 sigma of a rate */
     bst_study_close(&s);
     bst_study_close(&other);

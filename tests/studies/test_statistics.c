@@ -96,26 +96,32 @@ static void test_gaps(void **state) {
     }
 }
 
-/* Of more runs than are resampled, by the normal distribution. */
+/* Of more runs than are resampled, by the normal distribution: two columns, the second with a value
+ * in every third row only. */
 static void test_many(void **state) {
     (void)state;
     const int64_t rows = BST_BOOTSTRAP_RUNS + 1;
     bst_ctx ctx = {0};
-    double *values = malloc((size_t)rows * sizeof *values);
+    double *values = malloc(2 * (size_t)rows * sizeof *values);
     assert_non_null(values);
     for (int64_t i = 0; i < rows; i++) {
-        values[i] = (double)(i % 2);
+        values[2 * i] = (double)(i % 2);
+        values[2 * i + 1] = i % 3 == 0 ? (double)(4 * (i % 2)) : NAN;
     }
-    bst_statistics out;
+    bst_statistics out[2];
     bst_rng_key key = bst_rng_make_key(3, 0, "test", "many");
-    bst_assert_ok(&ctx, bst_statistics_of(&ctx, values, rows, 1, 10, key, &out));
-    double n = (double)rows, ones = floor(n / 2), mean = ones / n;
-    double std = sqrt(ones * (1 - mean) / (n - 1)); /* n p (1 - p) over n - 1 */
-    bst_assert_close(out.mean, mean, 1e-12);
-    bst_assert_close(out.std, std, 1e-12);
-    bst_assert_close(out.low, mean - 1.959963984540054 * std / sqrt(n), 1e-12);
-    bst_assert_close(out.high, mean + 1.959963984540054 * std / sqrt(n), 1e-12);
-    assert_true(out.p25 == 0 && out.p75 == 1 && out.p05 == 0 && out.p95 == 1);
+    bst_assert_ok(&ctx, bst_statistics_of(&ctx, values, rows, 2, 10, key, out));
+    for (int c = 0; c < 2; c++) {
+        const double n = ceil((double)rows / (c ? 3 : 1)), unit = c ? 4.0 : 1.0;
+        const double ones = floor(n / 2), mean = ones / n;
+        const double std = sqrt(ones * (1 - mean) / (n - 1)); /* n p (1 - p) over n - 1 */
+        assert_true((double)out[c].count == n && (double)out[c].missing == (double)rows - n);
+        bst_assert_close(out[c].mean, unit * mean, 1e-12);
+        bst_assert_close(out[c].std, unit * std, 1e-12);
+        bst_assert_close(out[c].low, unit * (mean - 1.959963984540054 * std / sqrt(n)), 1e-12);
+        bst_assert_close(out[c].high, unit * (mean + 1.959963984540054 * std / sqrt(n)), 1e-12);
+        assert_true(out[c].p25 == 0 && out[c].p75 == unit && out[c].p05 == 0 && out[c].p95 == unit);
+    }
     free(values);
 }
 

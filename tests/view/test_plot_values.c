@@ -78,8 +78,59 @@ static void test_innovation(void **state) {
     }
 }
 
+/* The same where the errors of both axes belong together, those of direction and rate crosswise
+ * too: an update by hand with P = D + t (C + C') + t^2 V, S = P + R and K = P S^-1. */
+static void test_slanting_innovation(void **state) {
+    (void)state;
+    const double u = BST_ARCSEC_RAD * BST_ARCSEC_RAD, t = 1.7, y[2] = {1.3, -0.8};
+    const double d[2][2] = {{5.0, 1.5}, {1.5, 3.0}}, v[2][2] = {{0.6, -0.3}, {-0.3, 0.9}};
+    const double c[2][2] = {{0.4, 0.5}, {-0.2, 0.3}}, noise[2][2] = {{0.5, 0.2}, {0.2, 0.4}};
+    double p[2][2], s[2][2], gain[2][2], q[2][2], moved[2];
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            p[i][j] = d[i][j] + t * (c[i][j] + c[j][i]) + t * t * v[i][j];
+            s[i][j] = p[i][j] + noise[i][j];
+        }
+    }
+    const double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
+    const double inverse[2][2] = {{s[1][1] / det, -s[0][1] / det}, {-s[1][0] / det, s[0][0] / det}};
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            gain[i][j] = p[i][0] * inverse[0][j] + p[i][1] * inverse[1][j];
+        }
+        for (int j = 0; j < 2; j++) {
+            q[i][j] = p[i][j] - gain[i][0] * p[0][j] - gain[i][1] * p[1][j];
+        }
+        moved[i] = gain[i][0] * y[0] + gain[i][1] * y[1];
+    }
+    const bst_view_track_state before = {
+        .track = 3,
+        .ra_deg = 80.0,
+        .dec_deg = 35.0,
+        .rate_arcsec_per_s = {2.0, -3.0},
+        .d11 = d[0][0] * u,
+        .d12 = d[0][1] * u,
+        .d22 = d[1][1] * u,
+        .dr = {{c[0][0] * u, c[0][1] * u}, {c[1][0] * u, c[1][1] * u}},
+        .r11 = v[0][0] * u,
+        .r12 = v[0][1] * u,
+        .r22 = v[1][1] * u};
+    bst_view_track_state after = before;
+    after.time_s = t;
+    after.dec_deg += (-3.0 * t + moved[1]) / 3600.0;
+    after.ra_deg += (2.0 * t + moved[0]) / 3600.0 / cos(after.dec_deg * BST_DEG_RAD);
+    after.d11 = q[0][0] * u;
+    after.d12 = q[0][1] * u;
+    after.d22 = q[1][1] * u;
+    double found, sigma3;
+    assert_true(bst_view_innovation(&before, &after, &found, &sigma3));
+    bst_assert_close(found, hypot(y[0], y[1]), 1e-6); /* rounding of degrees */
+    bst_assert_close(sigma3, 3.0 * sqrt(0.5 * (s[0][0] + s[1][1])), 1e-9);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_angle),
-                                       cmocka_unit_test(test_innovation)};
+                                       cmocka_unit_test(test_innovation),
+                                       cmocka_unit_test(test_slanting_innovation)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

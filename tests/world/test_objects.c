@@ -82,6 +82,49 @@ static void a_catalogue_adds_each_satellite_once(void **state) {
     scratch_remove(&s);
 }
 
+/* Each object has area, albedo and brightness of its own catalogue, whatever their sizes. */
+static void two_catalogues_have_settings_of_their_own(void **state) {
+    (void)state;
+    scratch s;
+    scratch_make(&s);
+    char catalogues[4400], path[2][sizeof s.path];
+    for (int c = 0; c < 2; c++) {
+        snprintf(path[c], sizeof path[c], "%s", scratch_path(&s, c ? "b.tle" : "a.tle"));
+        FILE *file = fopen(path[c], "w");
+        assert_non_null(file);
+        for (int i = 0; i < 3 - c; i++) {
+            write_set(file, "", 10001 + 2 * i + 100 * c, 166.0);
+        }
+        fclose(file);
+    }
+    snprintf(
+        catalogues, sizeof catalogues,
+        "{\"elements_file\": \"%s\", \"area_m2\": 2, \"albedo\": 0.5, \"brightness\": "
+        "{\"model\": \"standard_magnitude\", \"standard_v_mag\": 5}}, {\"elements_file\": \"%s\", "
+        "\"area_m2\": 3, \"albedo\": 0.1, \"brightness\": {\"model\": \"standard_magnitude\", "
+        "\"standard_v_mag\": 7}}",
+        path[0], path[1]);
+    bst_ctx ctx = {0};
+    bst_world *world;
+    bst_assert_ok(&ctx,
+                  make(&ctx,
+                       "{\"name\": \"GX5\", \"brightness\": {\"model\": \"standard_magnitude\", "
+                       "\"standard_v_mag\": 9}, " TEST_GX5 "}",
+                       catalogues, &world));
+    assert_int_equal(bst_world_object_count(world), 6);
+    assert_true(bst_brightness_config_of(bst_world_object(world, 0)->brightness)->standard_v_mag ==
+                9.0);
+    for (int i = 1; i < 6; i++) {
+        const bst_world_object_info *info = bst_world_object(world, i);
+        const bool second = info->norad > 10100;
+        assert_true(info->area_m2 == (second ? 3.0 : 2.0) && info->albedo == (second ? 0.1 : 0.5));
+        assert_true(bst_brightness_config_of(info->brightness)->standard_v_mag ==
+                    (second ? 7.0 : 5.0));
+    }
+    bst_world_free(world);
+    scratch_remove(&s);
+}
+
 static void an_index_finds_what_was_added(void **state) {
     (void)state;
     enum { NAMES = 20000 };
@@ -104,6 +147,7 @@ static void an_index_finds_what_was_added(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_catalogue_adds_each_satellite_once),
+        cmocka_unit_test(two_catalogues_have_settings_of_their_own),
         cmocka_unit_test(an_index_finds_what_was_added),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -229,8 +229,8 @@ static bst_status write_json(bst_ctx *ctx, const orbit *o, FILE *stream) {
     return BST_OK;
 }
 
-static void add_vector(cJSON *node, const char *key, bst_vec3 v, double scale) {
-    const double numbers[3] = {v.x * scale, v.y * scale, v.z * scale};
+static void add_vector(cJSON *node, const char *key, bst_vec3 v) {
+    const double numbers[3] = {v.x, v.y, v.z};
     cJSON_AddItemToObject(node, key, cJSON_CreateDoubleArray(numbers, 3));
 }
 
@@ -259,8 +259,8 @@ static bst_status write_report(bst_ctx *ctx, const orbit *o, FILE *stream) {
     bst_time_to_utc(time_at(o, s->state.time_s), 9, utc, sizeof utc);
     cJSON_AddStringToObject(node, "epoch_utc", utc);
     bst_json_add_number(node, "epoch_s", s->state.time_s);
-    add_vector(node, "position_gcrf_m", s->state.position_m, 1.0);
-    add_vector(node, "velocity_gcrf_mps", s->state.velocity_mps, 1.0);
+    add_vector(node, "position_gcrf_m", s->state.position_m);
+    add_vector(node, "velocity_gcrf_mps", s->state.velocity_mps);
     cJSON *matrix = cJSON_AddArrayToObject(node, "covariance_gcrf");
     for (int i = 0; i < 6; i++) {
         cJSON_AddItemToArray(matrix, cJSON_CreateDoubleArray(s->covariance[i], 6));
