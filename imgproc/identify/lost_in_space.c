@@ -37,10 +37,10 @@ static const double BRIGHTEST_V = -2.0;
 /* Least share of the predicted stars that a right attitude matches over the whole field. */
 static const double LEAST_SHARE = 0.35;
 /* Largest chi-square of four stars about the attitude and scale that fit them best, of four degrees
- * of freedom: a right quad is above it once in 100 times, and most frames have several. A candidate
- * by chance has a chi-square below c with a probability that grows with c^2. The error is added to
- * that of each place: distortion and neighbours. */
-static const double MOST_CHI_SQUARED = 13.3, QUAD_PX = 0.3;
+ * of freedom. Right quads with a star on another's streak have up to 25. A candidate by chance has
+ * a chi-square below c with a probability that grows with c^2. The error is added to that of each
+ * place: distortion and neighbours. */
+static const double MOST_CHI_SQUARED = 28.5, QUAD_PX = 0.3;
 /* Least share of a streak inside the window, for a star to be predicted. */
 static const double LEAST_INSIDE = 0.25;
 /* Error of a quad's own scale. */
@@ -373,23 +373,13 @@ static double log_ratio(const attempt *a, const int quad[4], int predicted, int 
     return sum;
 }
 
-/* Tries an attitude from a pattern: weighs its stars and refines it.
+/* Weighs the stars of an attitude and refines it.
  *
- * Given:     pairs  the quad's four stars
- *            quad   their sources */
-static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4], const int quad[4],
-                              double extrapolation_px, double ratio,
-                              bst_lost_in_space_result *out) {
-    bst_star_fit fit;
-    const double limit = a->options->scale_tolerance;
-    if (!bst_star_fit_start(a->s->camera, pairs, ratio, &fit) ||
-        !bst_star_fit_refine(a->s->camera, pairs, 4, &fit) ||
-        fabs(fit.scale - 1.0) > limit + SCALE_MARGIN || fit.chi_squared > MOST_CHI_SQUARED) {
-        return BST_OK;
-    }
-    out->candidates++;
-    /* the quad's own error grows with the distance from it */
-    double tolerance = fmin(FIRST_PX + extrapolation_px, MOST_FIRST_PX), evidence = 0.0;
+ * Given:     quad       sources that gave it
+ *            tolerance  of the first match, px */
+static bst_status verify(const attempt *a, bst_star_fit fit, const int quad[4], double tolerance,
+                         bst_lost_in_space_result *out) {
+    double evidence = 0.0;
     int predicted, sources, matched;
     for (int pass = 0; pass < PASSES; pass++) {
         BST_TRY(predict(a, &fit, &predicted));
@@ -410,7 +400,7 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
     }
     if (out->matched < LEAST_SHARE * out->predicted ||
         log(out->candidates) - evidence > log(a->options->false_rate) ||
-        fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
+        fabs(fit.scale - 1.0) > a->options->scale_tolerance + SCALE_MARGIN) {
         return BST_OK;
     }
     out->solved = true;
@@ -420,6 +410,25 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
     out->rms_px = fit.rms_px;
     out->log_chance = -evidence;
     return BST_OK;
+}
+
+/* Tries an attitude from a pattern.
+ *
+ * Given:     pairs  the quad's four stars
+ *            quad   their sources */
+static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4], const int quad[4],
+                              double extrapolation_px, double ratio,
+                              bst_lost_in_space_result *out) {
+    bst_star_fit fit;
+    if (!bst_star_fit_start(a->s->camera, pairs, ratio, &fit) ||
+        !bst_star_fit_refine(a->s->camera, pairs, 4, &fit) ||
+        fabs(fit.scale - 1.0) > a->options->scale_tolerance + SCALE_MARGIN ||
+        fit.chi_squared > MOST_CHI_SQUARED) {
+        return BST_OK;
+    }
+    out->candidates++;
+    /* the quad's own error grows with the distance from it */
+    return verify(a, fit, quad, fmin(FIRST_PX + extrapolation_px, MOST_FIRST_PX), out);
 }
 
 /* Tolerance of the code of four sources.
@@ -522,6 +531,12 @@ bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
     lost->matched_of = 0;
     read_sources(lost, frame);
     measure_window(&a);
+    if (frame->near) {
+        const bst_star_fit fit = {.q_cam_from_gcrf = frame->near->q_cam_from_gcrf,
+                                  .scale = frame->near->scale};
+        out->candidates = 1;
+        BST_TRY(verify(&a, fit, (const int[4]){-1, -1, -1, -1}, MOST_FIRST_PX, out));
+    }
     int most = lost->count < options->max_stars ? lost->count : options->max_stars;
     for (int l = 3; l < most && searching(&a, out); l++) {
         for (int k = 2; k < l && searching(&a, out); k++) {

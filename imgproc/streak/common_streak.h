@@ -99,7 +99,7 @@ const bst_star_path *bst_streak_finder_path(const bst_streak_finder *finder);
  * together on the pixels, and the filter searches what is left for fainter ones, with weights for
  * the light of the known ones, and so on (cf. DAOPHOT, Stetson 1987, PASP 99, 191).
  *
- * Given:     finder        made with known_path
+ * Given:     finder        also one without known_path
  *            path          copied; centre and tangent_per_px as for this frame
  *            least_snr     of the part of a streak inside the frame
  *            least_inside  share of the path that must be inside the frame
