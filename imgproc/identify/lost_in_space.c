@@ -66,7 +66,7 @@ struct bst_lost_in_space {
     int count;
     double *nearest2; /* [max_detections] distance^2 of the star matched to a source, in units of
                          its tolerance */
-    double *area_px2;     /* [max_detections] of a source's tolerance ellipse */
+    double *area_px2; /* [max_detections] of a source's tolerance ellipse */
     double (*inverse)[3]; /* [max_detections] of the tolerance ellipse's matrix: xx, xy, yy */
     int matched_of;       /* sources of star_of; 0: not solved */
     int *star_of;         /* [max_detections] predicted star; -1: none */

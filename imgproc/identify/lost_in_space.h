@@ -38,9 +38,9 @@ void bst_lost_in_space_free(bst_lost_in_space *lost);
 typedef struct bst_lost_in_space_result {
     bool solved; /* the rest holds only if true, but for the last three */
     bst_quat q_cam_from_gcrf;
-    double scale; /* true pixel scale over the camera's */
+    double scale;           /* true pixel scale over the camera's */
     int predicted, matched; /* stars up to v_limit */
-    double rms_px;       /* residual per axis of the matched stars */
+    double rms_px;          /* residual per axis of the matched stars */
     double log_chance;   /* natural logarithm of an upper limit of the chance of such a match under
                             the null model */
     int quads, patterns; /* tried; patterns whose code agreed with one */

@@ -31,7 +31,7 @@ typedef struct attempt {
     bst_streak_finder *finder;
     bst_common_streak streak;
     int width, height;
-    bool joint; /* stars are fitted together: streaks that cross have better places then */
+    bool joint;     /* stars are fitted together: streaks that cross have better places then */
     int joint_left; /* paths that may still be tried so */
 } attempt;
 
@@ -43,9 +43,13 @@ static bst_status solve_middles(attempt *a, int candidates, const bst_lost_in_sp
     bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
     options.scale_tolerance = a->options->scale_tolerance;
     options.max_candidates = candidates;
-    const bst_lost_in_space_frame frame = {
-        a->streak.items,     a->streak.count,   {0, 0, a->width, a->height},
-        a->options->v_limit, a->options->light, bst_streak_finder_path(a->finder), near};
+    const bst_lost_in_space_frame frame = {a->streak.items,
+                                           a->streak.count,
+                                           {0, 0, a->width, a->height},
+                                           a->options->v_limit,
+                                           a->options->light,
+                                           bst_streak_finder_path(a->finder),
+                                           near};
     return bst_lost_in_space_solve(a->ctx, a->lost, &options, &frame, out);
 }
 
@@ -99,7 +103,8 @@ static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
         const double before = length_px(&a->streak);
         const bst_lost_in_space_result near = *out;
         for (int i = 0; i < a->streak.count; i++) {
-            chosen[i] = bst_lost_in_space_matched(a->lost, i) || a->streak.items[i].snr > BRIGHT_SNR;
+            chosen[i] =
+                bst_lost_in_space_matched(a->lost, i) || a->streak.items[i].snr > BRIGHT_SNR;
         }
         BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
         BST_TRY((a->joint ? solve_together : solve_middles)(
@@ -164,7 +169,8 @@ static void add_choice(choices *c, const bst_star_path *path, double quality) {
 
 /* Measures the paths of shapes from one on: at most so many of whole and of cut sources. Those that
  * have been measured cost little. */
-static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_cut, choices *c) {
+static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_cut, bool extend,
+                                 choices *c) {
     const int shapes = bst_streak_finder_shapes(a->finder);
     int whole = 0, cut = 0;
     for (int i = from; i < shapes; i++) {
@@ -174,7 +180,7 @@ static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_
         if (is_cut ? cut >= most_cut : whole >= most_whole) {
             continue;
         }
-        BST_TRY(bst_streak_finder_measure(a->ctx, a->finder, i, &path, &quality));
+        BST_TRY(bst_streak_finder_measure(a->ctx, a->finder, i, extend, &path, &quality));
         if (quality > 0.0) {
             whole += !is_cut;
             cut += is_cut;
@@ -238,16 +244,23 @@ static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
     if (!c) {
         return bst_fail(a->ctx, BST_ERR_MEMORY, "no memory for the streaks of a frame");
     }
-    bst_status status = measure_shapes(a, BST_STREAK_FINDER_POINT, 2, 0, c); /* and the point */
+    bst_status status =
+        measure_shapes(a, BST_STREAK_FINDER_POINT, 2, 0, false, c); /* and the point */
     if (status == BST_OK && is_clear(c)) {
         status = try_choice(a, &c->items[0], out);
     }
     if (status == BST_OK && !out->attitude.solved) {
-        status = measure_shapes(a, 1, FIRST_SHAPES - 1, 0, c);
+        status = measure_shapes(a, 1, FIRST_SHAPES - 1, 0, false, c);
         status = status == BST_OK ? try_choices(a, c, out) : status;
     }
     if (status == BST_OK && !out->attitude.solved) {
-        status = measure_shapes(a, 0, SHAPES, CUT_SHAPES, c);
+        status = measure_shapes(a, 0, SHAPES, CUT_SHAPES, false, c);
+        status = status == BST_OK ? try_choices(a, c, out) : status;
+    }
+    if (status == BST_OK && !out->attitude.solved) {
+        c->count = 0; /* pieces may fit better than what they are pieces of */
+        a->joint_left = JOINT_TRIES;
+        status = measure_shapes(a, 0, SHAPES, CUT_SHAPES, true, c);
         status = status == BST_OK ? try_choices(a, c, out) : status;
     }
     free(c);
@@ -259,7 +272,12 @@ bst_status bst_plate_solve(bst_ctx *ctx, bst_lost_in_space *lost,
                            int height, bst_plate_solve_result *out) {
     assert(lost && options && pixels && out && options->light);
     *out = (bst_plate_solve_result){.points = false};
-    attempt a = {.ctx = ctx, .lost = lost, .options = options, .width = width, .height = height, .joint_left = JOINT_TRIES};
+    attempt a = {.ctx = ctx,
+                 .lost = lost,
+                 .options = options,
+                 .width = width,
+                 .height = height,
+                 .joint_left = JOINT_TRIES};
     const bst_common_streak_options streak = {.max_sources = BST_PLATE_SOLVE_STARS,
                                               .least_snr = options->least_snr,
                                               .tangent_per_px = options->tangent_per_px};

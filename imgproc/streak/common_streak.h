@@ -62,12 +62,14 @@ bool bst_streak_finder_is_cut(const bst_streak_finder *finder, int index);
  * subtracted (Hogbom 1974, A&AS 15, 417). They then give a better path.
  *
  * Given:     index    BST_STREAK_FINDER_POINT, or 0 to bst_streak_finder_shapes - 1
+ *            extend   the shape may be a piece of a streak: its path is extended along the light
  * Returned:  path     the path
  *            quality  how well the brightest stars fit it: the best path of a frame has the
  *                     greatest; 0: no path, or one that has been measured before
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *finder, int index,
-                                     bst_star_path *path, double *quality) BST_MUST_CHECK;
+                                     bool extend, bst_star_path *path,
+                                     double *quality) BST_MUST_CHECK;
 
 /* Finds all stars by a path, also those whose middle is outside the frame.
  *

@@ -373,7 +373,7 @@ static float snr_at(const bst_path_filter *f, int x, int y) {
 }
 
 double bst_path_filter_spread(const bst_path_filter *f) {
-    assert(f);
+    assert(f && f->subtractions == 0);
     double spread = 1.0;
     const int places = f->blocks * BLOCK * BLOCK;
     const int stride = places / SPREAD_PLACES | 1; /* odd: columns do not repeat */
