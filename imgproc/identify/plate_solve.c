@@ -93,23 +93,37 @@ static bst_status solve_path(attempt *a, const bst_star_path *path, int candidat
     return solve_middles(a, candidates, NULL, out);
 }
 
-/* Measures the path on the identified stars and solves again, until the streak keeps its length. If
- * it never does, or its ends are not certain then, they may lie in the light of other stars, with
- * the middle of the exposure in the wrong place: such a frame is not solved. */
+/* Measures the path on the identified stars and solves again.
+ *
+ * Given:     bright  also on bright stars that the catalogue lacks
+ * Returned:  *settled  the streak has kept its length */
+static bst_status improve_once(attempt *a, bool bright, bst_lost_in_space_result *out,
+                               bool *settled) {
+    bool chosen[BST_PLATE_SOLVE_STARS];
+    const double before = length_px(&a->streak);
+    const bst_lost_in_space_result near = *out;
+    for (int i = 0; i < a->streak.count; i++) {
+        chosen[i] = bst_lost_in_space_matched(a->lost, i) ||
+                    (bright && a->streak.items[i].snr > BRIGHT_SNR);
+    }
+    BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
+    BST_TRY((a->joint ? solve_together : solve_middles)(a, BST_LOST_IN_SPACE_USUAL.max_candidates,
+                                                        &near, out));
+    *settled = fabs(length_px(&a->streak) - before) < SAME_PX;
+    return BST_OK;
+}
+
+/* Improves the path until the streak keeps its length. If it never does, or its ends are not
+ * certain then, they may lie in the light of other stars, with the middle of the exposure in the
+ * wrong place: such a frame is not solved. Stars that the catalogue lacks help only a path that has
+ * settled: to a path that is too short, each half of a streak is a star. */
 static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
     bool settled = false;
     for (int pass = 0; pass < PASSES && out->solved && !settled; pass++) {
-        bool chosen[BST_PLATE_SOLVE_STARS];
-        const double before = length_px(&a->streak);
-        const bst_lost_in_space_result near = *out;
-        for (int i = 0; i < a->streak.count; i++) {
-            chosen[i] =
-                bst_lost_in_space_matched(a->lost, i) || a->streak.items[i].snr > BRIGHT_SNR;
-        }
-        BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
-        BST_TRY((a->joint ? solve_together : solve_middles)(
-            a, BST_LOST_IN_SPACE_USUAL.max_candidates, &near, out));
-        settled = fabs(length_px(&a->streak) - before) < SAME_PX;
+        BST_TRY(improve_once(a, false, out, &settled));
+    }
+    if (out->solved && settled && !(a->streak.ends_margin > LEAST_MARGIN)) {
+        BST_TRY(improve_once(a, true, out, &settled));
     }
     out->solved = out->solved && settled && a->streak.ends_margin > LEAST_MARGIN;
     return BST_OK;
