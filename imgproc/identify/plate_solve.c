@@ -19,6 +19,8 @@ static const double SAME_PX = 1.5;
 static const double LEAST_MARGIN = 8.0;
 /* Stars above this SNR measure the path of a solved frame even if the catalogue lacks them. */
 static const double BRIGHT_SNR = 10.0;
+/* Likelihood ratios whose logarithms differ by less than this are the same. */
+static const double SAME_RATIO = 2.0;
 /* Logarithm of the chance of the best candidate below which the frame may be solved by a better
  * path. */
 static const double NEARLY = -8.0;
@@ -113,19 +115,41 @@ static bst_status improve_once(attempt *a, bool bright, bst_lost_in_space_result
     return BST_OK;
 }
 
-/* Improves the path until the streak keeps its length. If it never does, or its ends are not
- * certain then, they may lie in the light of other stars, with the middle of the exposure in the
- * wrong place: such a frame is not solved. Stars that the catalogue lacks help only a path that has
- * settled: to a path that is too short, each half of a streak is a star. */
-static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
+/* Improves the path until the streak keeps its length.
+ *
+ * Given:     bright  from the beginning also on stars that the catalogue lacks; they always help a
+ *                    path that has settled
+ * Returned:  *best   greatest logarithm of the likelihood ratio so far */
+static bst_status improve_by(attempt *a, bool bright, bst_lost_in_space_result *out, double *best) {
     bool settled = false;
     for (int pass = 0; pass < PASSES && out->solved && !settled; pass++) {
-        BST_TRY(improve_once(a, false, out, &settled));
+        BST_TRY(improve_once(a, bright, out, &settled));
+        *best = out->solved ? fmax(*best, -out->log_chance) : *best;
     }
-    if (out->solved && settled && !(a->streak.ends_margin > LEAST_MARGIN)) {
+    if (out->solved && settled && !bright && !(a->streak.ends_margin > LEAST_MARGIN)) {
         BST_TRY(improve_once(a, true, out, &settled));
     }
-    out->solved = out->solved && settled && a->streak.ends_margin > LEAST_MARGIN;
+    out->solved = out->solved && settled && a->streak.ends_margin > LEAST_MARGIN &&
+                  -out->log_chance > *best - SAME_RATIO;
+    return BST_OK;
+}
+
+/* Improves the path of a solved frame. If the streak never keeps its length, or its ends are not
+ * certain then, they may lie in the light of other stars, with the middle of the exposure in the
+ * wrong place: such a frame is not solved. The identified stars measure the path first. To a path
+ * that is too short, each half of a streak is a star, and such stars would keep it so: a path by
+ * all bright stars must not fit worse than those before. */
+static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
+    const bst_star_path path = *bst_streak_finder_path(a->finder);
+    const bst_lost_in_space_result first = *out;
+    double best = -first.log_chance;
+    BST_TRY(improve_by(a, false, out, &best));
+    if (!out->solved) {
+        BST_TRY(bst_streak_finder_search(a->ctx, a->finder, &path, &a->streak));
+        BST_TRY((a->joint ? solve_together : solve_middles)(
+            a, BST_LOST_IN_SPACE_USUAL.max_candidates, &first, out));
+        BST_TRY(improve_by(a, true, out, &best));
+    }
     return BST_OK;
 }
 
