@@ -25,16 +25,22 @@ static const double LEAST_MOST_TOLERANCE = 0.02, MOST_TOLERANCE = 0.06, FEW = 10
 static const double LEAST_SIZE = 0.08;
 /* Tolerances of matched stars: first, by the quad alone, and last. */
 static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 0.6, LAST_SIGMAS = 3.0;
-/* Chance of a first match above which a candidate is dropped at once. */
-static const double FIRST_LOG_CHANCE = -4.6; /* 1 % */
+/* Logarithm of the likelihood ratio of a first match below which a candidate is dropped at once. */
+static const double LEAST_FIRST = 1.5;
+/* Stars are predicted so much beyond the limit at which all are detected, mag. Probabilities that a
+ * catalogue star up to that limit, and one at the end, is among the detections: 0.9 falls linearly
+ * to 0.2, to a half near an SNR of 6 where the limit is one of 8. */
+static const double FAINTER_MAG = 0.5, SURELY_FOUND = 0.9, LEAST_FOUND = 0.2;
+/* Least chance that a place holds a detection: frames are not as clean as the null model. */
+static const double LEAST_CHANCE = 1e-5;
 static const double BRIGHTEST_V = -2.0;
 /* Least share of the predicted stars that a right attitude matches over the whole field. */
 static const double LEAST_SHARE = 0.35;
 /* Largest chi-square of four stars about the attitude and scale that fit them best, of four degrees
- * of freedom: a right quad is above it once in 100 times, and most frames have several. A candidate
- * by chance has a chi-square below c with a probability that grows with c^2. The error is added to
- * that of each place: distortion and neighbours. */
-static const double MOST_CHI_SQUARED = 13.3, QUAD_PX = 0.3;
+ * of freedom. Right quads with a star on another's streak have up to 25. A candidate by chance has
+ * a chi-square below c with a probability that grows with c^2. The error is added to that of each
+ * place: distortion and neighbours. */
+static const double MOST_CHI_SQUARED = 28.5, QUAD_PX = 0.3;
 /* Least share of a streak inside the window, for a star to be predicted. */
 static const double LEAST_INSIDE = 0.25;
 /* Error of a quad's own scale. */
@@ -60,11 +66,13 @@ struct bst_lost_in_space {
     int count;
     double *nearest2; /* [max_detections] distance^2 of the star matched to a source, in units of
                          its tolerance */
+    double *area_px2; /* [max_detections] of a source's tolerance ellipse */
     double (*inverse)[3]; /* [max_detections] of the tolerance ellipse's matrix: xx, xy, yy */
     int matched_of;       /* sources of star_of; 0: not solved */
     int *star_of;         /* [max_detections] predicted star; -1: none */
     bst_star *found;      /* [MOST_PREDICTED] */
     bst_star_fit_pair *expected; /* [MOST_PREDICTED] */
+    double *found_share;         /* [MOST_PREDICTED] probability that each is detected */
     bst_star_fit_pair *matched;  /* [MOST_PREDICTED] */
 };
 
@@ -73,10 +81,12 @@ static void lay_out(bst_lost_in_space *s) {
     BST_ARENA_TAKE(&s->arena, s->order, items);
     BST_ARENA_TAKE(&s->arena, s->sources, items);
     BST_ARENA_TAKE(&s->arena, s->nearest2, items);
+    BST_ARENA_TAKE(&s->arena, s->area_px2, items);
     BST_ARENA_TAKE(&s->arena, s->inverse, items);
     BST_ARENA_TAKE(&s->arena, s->star_of, items);
     BST_ARENA_TAKE(&s->arena, s->found, MOST_PREDICTED);
     BST_ARENA_TAKE(&s->arena, s->expected, MOST_PREDICTED);
+    BST_ARENA_TAKE(&s->arena, s->found_share, MOST_PREDICTED);
     BST_ARENA_TAKE(&s->arena, s->matched, MOST_PREDICTED);
 }
 
@@ -209,7 +219,20 @@ static double loss_mag(const attempt *a, double x_px, double y_px) {
     return inside >= LEAST_INSIDE * all ? 1.25 * log10(inside / all) : -HUGE_VAL;
 }
 
-/* Predicts the catalogue stars that the window shows. */
+/* Probability that a star is detected, by the magnitudes that it lies beyond the limit. */
+static double found_share_of(double beyond_mag) {
+    double share = fmax(beyond_mag, 0.0) / FAINTER_MAG;
+    return SURELY_FOUND + share * (LEAST_FOUND - SURELY_FOUND);
+}
+
+/* Magnitudes of a star beyond the limit at its place. False: it is too faint to be seen. */
+static bool beyond_limit(const attempt *a, const bst_star *star, const bst_star_fit_pair *place,
+                         double *beyond_mag) {
+    *beyond_mag = (double)star->v_mag - a->frame->v_limit - loss_mag(a, place->x_px, place->y_px);
+    return *beyond_mag <= FAINTER_MAG;
+}
+
+/* Predicts the catalogue stars that the window may show. */
 static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count) {
     bst_lost_in_space *s = a->s;
     const bst_window w = a->frame->window;
@@ -228,7 +251,7 @@ static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count)
     int total = 0;
     bst_star_query cone = {direction,
                            radius,
-                           fmin(a->frame->v_limit, s->depth_v_mag),
+                           fmin(a->frame->v_limit, s->depth_v_mag) + FAINTER_MAG,
                            {s->julian_year, a->frame->light->sun_m}};
     for (; cone.v_limit > BRIGHTEST_V; cone.v_limit -= 0.5) {
         BST_TRY(bst_stars_query_seen(a->ctx, s->stars, &cone, s->found, MOST_PREDICTED, &total));
@@ -239,10 +262,11 @@ static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count)
     *count = 0;
     for (int i = 0; i < total && i < MOST_PREDICTED; i++) {
         bst_star_fit_pair *e = &s->expected[*count];
+        double beyond_mag;
         e->gcrf = bst_light_apparent_star(a->frame->light, s->found[i].icrs);
         if (bst_star_fit_project(fit, s->camera, e->gcrf, &e->x_px, &e->y_px) &&
-            (double)s->found[i].v_mag <= a->frame->v_limit + loss_mag(a, e->x_px, e->y_px)) {
-            ++*count;
+            beyond_limit(a, &s->found[i], e, &beyond_mag)) {
+            s->found_share[(*count)++] = found_share_of(beyond_mag);
         }
     }
     return BST_OK;
@@ -271,17 +295,14 @@ static double tolerance_ellipse(const source *s, double tolerance_px, double inv
 /* Matches predicted stars to the nearest of the brightest sources, one to one.
  *
  * Returned:  s->matched  the pairs
- *            *area_px2   of all sources' ellipses
  *            number of pairs */
-static int match(const attempt *a, int predicted, int sources, double tolerance_px,
-                 double *area_px2) {
+static int match(const attempt *a, int predicted, int sources, double tolerance_px) {
     bst_lost_in_space *s = a->s;
     int count = 0;
-    *area_px2 = 0.0;
     for (int i = 0; i < sources; i++) {
         s->star_of[i] = -1;
         s->nearest2[i] = 1.0;
-        *area_px2 += tolerance_ellipse(&s->sources[i], tolerance_px, s->inverse[i]);
+        s->area_px2[i] = tolerance_ellipse(&s->sources[i], tolerance_px, s->inverse[i]);
     }
     for (int k = 0; k < predicted; k++) {
         const bst_star_fit_pair *e = &s->expected[k];
@@ -316,39 +337,59 @@ static int rivals(const bst_lost_in_space *s, int predicted) {
     return s->count < most ? s->count : most;
 }
 
-/* Logarithm of the chance that the stars beside the quad's four match. */
-static double log_chance(const attempt *a, int predicted, int matched, double area_px2) {
-    double chance = bst_null_model_chance(area_px2, a->area_px2);
-    return bst_null_model_log_tail(predicted > 4 ? predicted - 4 : 0, matched - 4, chance);
+/* True for a source of the quad. */
+static bool is_of(const int quad[4], int i) {
+    return i == quad[0] || i == quad[1] || i == quad[2] || i == quad[3];
 }
 
-/* Tries an attitude from a pattern: counts its stars and refines it.
+/* Weighs a match of predicted stars: the likelihood of the detections if the attitude is right,
+ * over that if they are spread evenly. A star is in the ellipse of a detection with its probability
+ * of being detected, or by chance. The quad's own detections do not count.
  *
- * Given:     pairs  the quad's four stars */
-static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4],
-                              double extrapolation_px, double ratio,
-                              bst_lost_in_space_result *out) {
-    bst_star_fit fit;
-    const double limit = a->options->scale_tolerance;
-    if (!bst_star_fit_start(a->s->camera, pairs, ratio, &fit) ||
-        !bst_star_fit_refine(a->s->camera, pairs, 4, &fit) ||
-        fabs(fit.scale - 1.0) > limit + SCALE_MARGIN || fit.chi_squared > MOST_CHI_SQUARED) {
-        return BST_OK;
+ * Returned:  out->predicted, matched  those up to the frame's limit
+ *            logarithm of the ratio. By the null model its mean is 1, so that it exceeds R with a
+ *            probability of at most 1 / R (Markov's inequality) */
+static double log_ratio(const attempt *a, const int quad[4], int predicted, int sources,
+                        bst_lost_in_space_result *out) {
+    bst_lost_in_space *s = a->s;
+    double area_px2 = 0.0, sum = 0.0;
+    out->predicted = out->matched = 0;
+    for (int i = 0; i < sources; i++) {
+        area_px2 += is_of(quad, i) ? 0.0 : s->area_px2[i];
     }
-    out->candidates++;
-    /* the quad's own error grows with the distance from it */
-    double tolerance = fmin(FIRST_PX + extrapolation_px, MOST_FIRST_PX);
-    double area_px2;
+    const double chance = fmax(bst_null_model_chance(area_px2, a->area_px2), LEAST_CHANCE);
+    for (int k = 0; k < predicted; k++) {
+        out->predicted += s->found_share[k] >= SURELY_FOUND;
+        sum += log((1.0 - s->found_share[k]) / (1.0 - chance));
+    }
+    for (int i = 0; i < sources; i++) {
+        if (s->star_of[i] >= 0) {
+            double share = s->found_share[s->star_of[i]];
+            double missed = log((1.0 - share) / (1.0 - chance));
+            out->matched += share >= SURELY_FOUND;
+            sum += (is_of(quad, i) ? 0.0 : log(share / chance)) - missed;
+        }
+    }
+    return sum;
+}
+
+/* Weighs the stars of an attitude and refines it.
+ *
+ * Given:     quad       sources that gave it
+ *            tolerance  of the first match, px */
+static bst_status verify(const attempt *a, bst_star_fit fit, const int quad[4], double tolerance,
+                         bst_lost_in_space_result *out) {
+    double evidence = 0.0;
     int predicted, sources, matched;
     for (int pass = 0; pass < PASSES; pass++) {
         BST_TRY(predict(a, &fit, &predicted));
         sources = rivals(a->s, predicted);
-        matched = match(a, predicted, sources, tolerance, &area_px2);
-        double chance = matched < 5 ? 0.0 : log_chance(a, predicted, matched, area_px2);
-        if (pass == 0) {
-            out->least_log_chance = fmin(out->least_log_chance, chance + log(out->candidates));
+        matched = match(a, predicted, sources, tolerance);
+        evidence = log_ratio(a, quad, predicted, sources, out);
+        if (pass == 0 || pass == PASSES - 1) {
+            out->least_log_chance = fmin(out->least_log_chance, log(out->candidates) - evidence);
         }
-        if (matched < 5 || (pass == 0 && chance > FIRST_LOG_CHANCE)) {
+        if (matched < 5 || (pass == 0 && evidence < LEAST_FIRST)) {
             return BST_OK;
         }
         if (!bst_star_fit_refine(a->s->camera, a->s->matched, matched, &fit)) {
@@ -357,22 +398,37 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
         /* the stars near the quad are matched first, and carry the fit on to the others */
         tolerance = pass + 2 < PASSES ? fmax(LAST_PX, 0.5 * tolerance) : LAST_PX;
     }
-    double chance = log_chance(a, predicted, matched, area_px2);
-    out->least_log_chance = fmin(out->least_log_chance, chance + log(out->candidates));
-    if (matched < LEAST_SHARE * predicted ||
-        chance + log(out->candidates) > log(a->options->false_rate) ||
-        fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
+    if (out->matched < LEAST_SHARE * out->predicted ||
+        log(out->candidates) - evidence > log(a->options->false_rate) ||
+        fabs(fit.scale - 1.0) > a->options->scale_tolerance + SCALE_MARGIN) {
         return BST_OK;
     }
     out->solved = true;
     a->s->matched_of = sources;
     out->q_cam_from_gcrf = fit.q_cam_from_gcrf;
     out->scale = fit.scale;
-    out->predicted = predicted;
-    out->matched = matched;
     out->rms_px = fit.rms_px;
-    out->log_chance = chance;
+    out->log_chance = -evidence;
     return BST_OK;
+}
+
+/* Tries an attitude from a pattern.
+ *
+ * Given:     pairs  the quad's four stars
+ *            quad   their sources */
+static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4], const int quad[4],
+                              double extrapolation_px, double ratio,
+                              bst_lost_in_space_result *out) {
+    bst_star_fit fit;
+    if (!bst_star_fit_start(a->s->camera, pairs, ratio, &fit) ||
+        !bst_star_fit_refine(a->s->camera, pairs, 4, &fit) ||
+        fabs(fit.scale - 1.0) > a->options->scale_tolerance + SCALE_MARGIN ||
+        fit.chi_squared > MOST_CHI_SQUARED) {
+        return BST_OK;
+    }
+    out->candidates++;
+    /* the quad's own error grows with the distance from it */
+    return verify(a, fit, quad, fmin(FIRST_PX + extrapolation_px, MOST_FIRST_PX), out);
 }
 
 /* Tolerance of the code of four sources.
@@ -411,7 +467,7 @@ static bst_status try_form(const attempt *a, const bst_star_quad *quad, const in
             pairs[i].cov_yy += QUAD_PX * QUAD_PX;
         }
         out->patterns++;
-        BST_TRY(try_pattern(a, pairs, extrapolation_px, found[k].size_ratio, out));
+        BST_TRY(try_pattern(a, pairs, star, extrapolation_px, found[k].size_ratio, out));
     }
     return BST_OK;
 }
@@ -475,6 +531,12 @@ bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
     lost->matched_of = 0;
     read_sources(lost, frame);
     measure_window(&a);
+    if (frame->near) {
+        const bst_star_fit fit = {.q_cam_from_gcrf = frame->near->q_cam_from_gcrf,
+                                  .scale = frame->near->scale};
+        out->candidates = 1;
+        BST_TRY(verify(&a, fit, (const int[4]){-1, -1, -1, -1}, MOST_FIRST_PX, out));
+    }
     int most = lost->count < options->max_stars ? lost->count : options->max_stars;
     for (int l = 3; l < most && searching(&a, out); l++) {
         for (int k = 2; k < l && searching(&a, out); k++) {

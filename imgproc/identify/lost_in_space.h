@@ -35,6 +35,20 @@ bst_status bst_lost_in_space_create(bst_ctx *ctx, const bst_camera *camera, cons
 /* Frees a work space; NULL is allowed. */
 void bst_lost_in_space_free(bst_lost_in_space *lost);
 
+typedef struct bst_lost_in_space_result {
+    bool solved; /* the rest holds only if true, but for the last three */
+    bst_quat q_cam_from_gcrf;
+    double scale;           /* true pixel scale over the camera's */
+    int predicted, matched; /* stars up to v_limit */
+    double rms_px;          /* residual per axis of the matched stars */
+    double log_chance;   /* natural logarithm of an upper limit of the chance of such a match under
+                            the null model */
+    int quads, patterns; /* tried; patterns whose code agreed with one */
+    int candidates;      /* of these, patterns whose four stars fit one attitude and scale */
+    double least_log_chance; /* over all candidates, of log_chance plus the logarithm of the number
+                                of candidates so far, accepted or not; at most 0 */
+} bst_lost_in_space_result;
+
 /* A frame's detections, and what is known besides. */
 typedef struct bst_lost_in_space_frame {
     const bst_detection *items; /* only those labelled UNKNOWN or STAR take part */
@@ -44,28 +58,18 @@ typedef struct bst_lost_in_space_frame {
     const bst_light *light;
     const bst_star_path *path; /* of all stars; NULL: they are points. Detections are places of its
                                   origin, also outside the window. */
+    const bst_lost_in_space_result *near; /* a solution of the same frame with other places, which
+                                             is tried first; NULL: none */
 } bst_lost_in_space_frame;
-
-typedef struct bst_lost_in_space_result {
-    bool solved; /* the rest holds only if true, but for the last three */
-    bst_quat q_cam_from_gcrf;
-    double scale; /* true pixel scale over the camera's */
-    int predicted, matched;
-    double rms_px;       /* residual per axis of the matched stars */
-    double log_chance;   /* natural logarithm of the chance of such a match under the null model */
-    int quads, patterns; /* tried; patterns whose code agreed with one */
-    int candidates;      /* of these, patterns whose four stars fit one attitude and scale */
-    double least_log_chance; /* over all candidates, of log_chance plus the logarithm of the number
-                                of candidates so far, accepted or not; at most 0 */
-} bst_lost_in_space_result;
 
 /* Identifies the stars of a frame without an attitude.
  *
  * Quads of detections, the brightest first, are looked up among the patterns. A pattern that agrees
- * gives attitude and scale; if its four stars fit them, the catalogue's stars are predicted, and
- * those with a detection nearby are counted. The attitude is accepted if chance would match as many
- * stars with less probability than options.false_rate, divided by the number of patterns tried so
- * far. Attitude and scale are last fitted to all matched stars by least squares.
+ * gives attitude and scale; if its four stars fit them, the catalogue's stars are predicted, those
+ * up to half a magnitude beyond v_limit too, and matched with the detections. The attitude is
+ * accepted if the likelihood of the detections is greater than that of evenly spread ones by more
+ * than the number of candidates so far over options.false_rate. Attitude and scale are last fitted
+ * to all matched stars by least squares.
  *
  * Errors:    those of the catalogue
  * Notes:     a mirrored frame is not solved, by its patterns' handedness

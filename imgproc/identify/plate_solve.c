@@ -6,15 +6,21 @@
 
 /* Shapes that are measured: FIRST_SHAPES of whole sources, and if none gives an attitude more, of
  * whole and cut ones. The best TRIES paths are tried. */
-enum { FIRST_SHAPES = 3, SHAPES = 6, CUT_SHAPES = 4, TRIES = 4, PASSES = 4 };
+enum { FIRST_SHAPES = 3, SHAPES = 6, CUT_SHAPES = 4, TRIES = 4, PASSES = 4, JOINT_TRIES = 2 };
 /* Candidates of a frame of points: most are solved by the first, and pieces of streaks are not. */
 enum { POINT_CANDIDATES = 3000 };
 /* Ends nearer to each other than this are one: the stars are points. */
 static const double POINT_PX = 4.0;
+/* Share of a streak in the frame from which on a star is used. */
+static const double LEAST_INSIDE = 0.25;
 /* Streaks are of one length within this. */
 static const double SAME_PX = 1.5;
 /* Least log-likelihood of a streak's ends over that of ends elsewhere: one wrong in 3000. */
 static const double LEAST_MARGIN = 8.0;
+/* Stars above this SNR measure the path of a solved frame even if the catalogue lacks them. */
+static const double BRIGHT_SNR = 10.0;
+/* Likelihood ratios whose logarithms differ by less than this are the same. */
+static const double SAME_RATIO = 2.0;
 /* Logarithm of the chance of the best candidate below which the frame may be solved by a better
  * path. */
 static const double NEARLY = -8.0;
@@ -27,16 +33,25 @@ typedef struct attempt {
     bst_streak_finder *finder;
     bst_common_streak streak;
     int width, height;
+    bool joint;     /* stars are fitted together: streaks that cross have better places then */
+    int joint_left; /* paths that may still be tried so */
 } attempt;
 
-/* Solves the stars by the middles of their streaks. */
-static bst_status solve_middles(attempt *a, int candidates, bst_lost_in_space_result *out) {
+/* Solves the stars by the middles of their streaks.
+ *
+ * Given:     near  a solution with an earlier path; NULL: none */
+static bst_status solve_middles(attempt *a, int candidates, const bst_lost_in_space_result *near,
+                                bst_lost_in_space_result *out) {
     bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
     options.scale_tolerance = a->options->scale_tolerance;
     options.max_candidates = candidates;
-    const bst_lost_in_space_frame frame = {
-        a->streak.items,     a->streak.count,   {0, 0, a->width, a->height},
-        a->options->v_limit, a->options->light, bst_streak_finder_path(a->finder)};
+    const bst_lost_in_space_frame frame = {a->streak.items,
+                                           a->streak.count,
+                                           {0, 0, a->width, a->height},
+                                           a->options->v_limit,
+                                           a->options->light,
+                                           bst_streak_finder_path(a->finder),
+                                           near};
     return bst_lost_in_space_solve(a->ctx, a->lost, &options, &frame, out);
 }
 
@@ -44,29 +59,97 @@ static double length_px(const bst_common_streak *s) {
     return hypot(s->ends[1].x_px - s->ends[0].x_px, s->ends[1].y_px - s->ends[0].y_px);
 }
 
+/* Whole light of a source of unit amplitude. The convolution is with a Gaussian of 1 px and unit
+ * sum of squares, after which a point of light F has the height F / sqrt(4 pi). Along a streak the
+ * amplitude is that of a sample, which its neighbours overlap. */
+static double light_of_amplitude(const bst_star_path *path) {
+    double light = 0.0;
+    if (path->count == 1) {
+        return sqrt(4.0 * BST_PI);
+    }
+    for (int k = -path->count; k <= path->count; k++) {
+        double d = BST_STAR_PATH_STEP_PX * k;
+        light += path->count * BST_STAR_PATH_STEP_PX * exp(-0.25 * d * d);
+    }
+    return light;
+}
+
+/* Fits the stars of the finder's path together, finds those that the fit leaves, and solves. */
+static bst_status solve_together(attempt *a, int candidates, const bst_lost_in_space_result *near,
+                                 bst_lost_in_space_result *out) {
+    const bst_star_path *path = bst_streak_finder_path(a->finder);
+    BST_TRY(bst_streak_finder_follow(a->ctx, a->finder, path, a->options->least_snr, LEAST_INSIDE,
+                                     &a->streak));
+    a->streak.ends_margin = fmin(path->margin[0], path->margin[1]);
+    for (int i = 0; i < a->streak.count; i++) { /* in the unit of bst_streak_finder_search */
+        a->streak.items[i].flux_e /= light_of_amplitude(path);
+        a->streak.items[i].flux_sigma_e /= light_of_amplitude(path);
+    }
+    return solve_middles(a, candidates, near, out);
+}
+
 /* Solves the frame by a path: finds its stars and tries their middles. */
 static bst_status solve_path(attempt *a, const bst_star_path *path, int candidates,
                              bst_lost_in_space_result *out) {
     BST_TRY(bst_streak_finder_search(a->ctx, a->finder, path, &a->streak));
-    return solve_middles(a, candidates, out);
+    return solve_middles(a, candidates, NULL, out);
 }
 
-/* Measures the path on the identified stars and solves again, until the streak keeps its length. If
- * it never does, or its ends are not certain then, they may lie in the light of other stars, with
- * the middle of the exposure in the wrong place: such a frame is not solved. */
-static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
+/* Measures the path on the identified stars and solves again.
+ *
+ * Given:     bright  also on bright stars that the catalogue lacks
+ * Returned:  *settled  the streak has kept its length */
+static bst_status improve_once(attempt *a, bool bright, bst_lost_in_space_result *out,
+                               bool *settled) {
+    bool chosen[BST_PLATE_SOLVE_STARS];
+    const double before = length_px(&a->streak);
+    const bst_lost_in_space_result near = *out;
+    for (int i = 0; i < a->streak.count; i++) {
+        chosen[i] = bst_lost_in_space_matched(a->lost, i) ||
+                    (bright && a->streak.items[i].snr > BRIGHT_SNR);
+    }
+    BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
+    BST_TRY((a->joint ? solve_together : solve_middles)(a, BST_LOST_IN_SPACE_USUAL.max_candidates,
+                                                        &near, out));
+    *settled = fabs(length_px(&a->streak) - before) < SAME_PX;
+    return BST_OK;
+}
+
+/* Improves the path until the streak keeps its length.
+ *
+ * Given:     bright  from the beginning also on stars that the catalogue lacks; they always help a
+ *                    path that has settled
+ * Returned:  *best   greatest logarithm of the likelihood ratio so far */
+static bst_status improve_by(attempt *a, bool bright, bst_lost_in_space_result *out, double *best) {
     bool settled = false;
     for (int pass = 0; pass < PASSES && out->solved && !settled; pass++) {
-        bool chosen[BST_PLATE_SOLVE_STARS];
-        double before = length_px(&a->streak);
-        for (int i = 0; i < a->streak.count; i++) {
-            chosen[i] = bst_lost_in_space_matched(a->lost, i);
-        }
-        BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
-        BST_TRY(solve_middles(a, BST_LOST_IN_SPACE_USUAL.max_candidates, out));
-        settled = fabs(length_px(&a->streak) - before) < SAME_PX;
+        BST_TRY(improve_once(a, bright, out, &settled));
+        *best = out->solved ? fmax(*best, -out->log_chance) : *best;
     }
-    out->solved = out->solved && settled && a->streak.ends_margin > LEAST_MARGIN;
+    if (out->solved && settled && !bright && !(a->streak.ends_margin > LEAST_MARGIN)) {
+        BST_TRY(improve_once(a, true, out, &settled));
+    }
+    out->solved = out->solved && settled && a->streak.ends_margin > LEAST_MARGIN &&
+                  -out->log_chance > *best - SAME_RATIO;
+    return BST_OK;
+}
+
+/* Improves the path of a solved frame. If the streak never keeps its length, or its ends are not
+ * certain then, they may lie in the light of other stars, with the middle of the exposure in the
+ * wrong place: such a frame is not solved. The identified stars measure the path first. To a path
+ * that is too short, each half of a streak is a star, and such stars would keep it so: a path by
+ * all bright stars must not fit worse than those before. */
+static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
+    const bst_star_path path = *bst_streak_finder_path(a->finder);
+    const bst_lost_in_space_result first = *out;
+    double best = -first.log_chance;
+    BST_TRY(improve_by(a, false, out, &best));
+    if (!out->solved) {
+        BST_TRY(bst_streak_finder_search(a->ctx, a->finder, &path, &a->streak));
+        BST_TRY((a->joint ? solve_together : solve_middles)(
+            a, BST_LOST_IN_SPACE_USUAL.max_candidates, &first, out));
+        BST_TRY(improve_by(a, true, out, &best));
+    }
     return BST_OK;
 }
 
@@ -78,29 +161,14 @@ static bst_status try_again(attempt *a, int candidates, bst_lost_in_space_result
             chosen[i] = true;
         }
         BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
-        BST_TRY(solve_middles(a, candidates, out));
+        BST_TRY(solve_middles(a, candidates, NULL, out));
     }
     return BST_OK;
 }
 
-/* Whole light of a source of unit amplitude. The convolution is with a Gaussian of 1 px and unit
- * sum of squares, after which a point of light F has the height F / sqrt(4 pi). Along a streak the
- * amplitude is that of a sample, which its neighbours overlap. */
-static double light_of_amplitude(const bst_plate_solve_result *r) {
-    double light = 0.0;
-    if (r->points) {
-        return sqrt(4.0 * BST_PI);
-    }
-    for (int k = -r->path.count; k <= r->path.count; k++) {
-        double d = BST_STAR_PATH_STEP_PX * k;
-        light += r->path.count * BST_STAR_PATH_STEP_PX * exp(-0.25 * d * d);
-    }
-    return light;
-}
-
 /* Lists the stars that the catalogue has. */
 static void list_matched(const attempt *a, bst_plate_solve_result *out) {
-    double light = light_of_amplitude(out);
+    const double light = light_of_amplitude(&out->path);
     out->matched_count = 0;
     for (int i = 0; i < a->streak.count && out->attitude.solved; i++) {
         const bst_detection *d = &a->streak.items[i];
@@ -139,7 +207,8 @@ static void add_choice(choices *c, const bst_star_path *path, double quality) {
 
 /* Measures the paths of shapes from one on: at most so many of whole and of cut sources. Those that
  * have been measured cost little. */
-static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_cut, choices *c) {
+static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_cut, bool extend,
+                                 choices *c) {
     const int shapes = bst_streak_finder_shapes(a->finder);
     int whole = 0, cut = 0;
     for (int i = from; i < shapes; i++) {
@@ -149,7 +218,7 @@ static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_
         if (is_cut ? cut >= most_cut : whole >= most_whole) {
             continue;
         }
-        BST_TRY(bst_streak_finder_measure(a->ctx, a->finder, i, &path, &quality));
+        BST_TRY(bst_streak_finder_measure(a->ctx, a->finder, i, extend, &path, &quality));
         if (quality > 0.0) {
             whole += !is_cut;
             cut += is_cut;
@@ -169,9 +238,16 @@ static bst_status try_choice(attempt *a, choice *c, bst_plate_solve_result *out)
     if (!out->points) {
         BST_TRY(try_again(a, candidates, &out->attitude));
     }
+    if (!out->attitude.solved && !out->points && a->joint_left > 0 &&
+        fmin(c->path.margin[0], c->path.margin[1]) > LEAST_MARGIN) {
+        a->joint_left--;
+        a->joint = true;
+        BST_TRY(solve_together(a, candidates, NULL, &out->attitude));
+    }
     if (out->attitude.solved && !out->points) {
         BST_TRY(improve(a, &out->attitude));
     }
+    a->joint = false;
     out->stars = a->streak.count;
     out->ends_margin = a->streak.ends_margin;
     out->ends[0] = a->streak.ends[0];
@@ -206,16 +282,23 @@ static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
     if (!c) {
         return bst_fail(a->ctx, BST_ERR_MEMORY, "no memory for the streaks of a frame");
     }
-    bst_status status = measure_shapes(a, BST_STREAK_FINDER_POINT, 2, 0, c); /* and the point */
+    bst_status status =
+        measure_shapes(a, BST_STREAK_FINDER_POINT, 2, 0, false, c); /* and the point */
     if (status == BST_OK && is_clear(c)) {
         status = try_choice(a, &c->items[0], out);
     }
     if (status == BST_OK && !out->attitude.solved) {
-        status = measure_shapes(a, 1, FIRST_SHAPES - 1, 0, c);
+        status = measure_shapes(a, 1, FIRST_SHAPES - 1, 0, false, c);
         status = status == BST_OK ? try_choices(a, c, out) : status;
     }
     if (status == BST_OK && !out->attitude.solved) {
-        status = measure_shapes(a, 0, SHAPES, CUT_SHAPES, c);
+        status = measure_shapes(a, 0, SHAPES, CUT_SHAPES, false, c);
+        status = status == BST_OK ? try_choices(a, c, out) : status;
+    }
+    if (status == BST_OK && !out->attitude.solved) {
+        c->count = 0; /* pieces may fit better than what they are pieces of */
+        a->joint_left = JOINT_TRIES;
+        status = measure_shapes(a, 0, SHAPES, CUT_SHAPES, true, c);
         status = status == BST_OK ? try_choices(a, c, out) : status;
     }
     free(c);
@@ -227,7 +310,12 @@ bst_status bst_plate_solve(bst_ctx *ctx, bst_lost_in_space *lost,
                            int height, bst_plate_solve_result *out) {
     assert(lost && options && pixels && out && options->light);
     *out = (bst_plate_solve_result){.points = false};
-    attempt a = {.ctx = ctx, .lost = lost, .options = options, .width = width, .height = height};
+    attempt a = {.ctx = ctx,
+                 .lost = lost,
+                 .options = options,
+                 .width = width,
+                 .height = height,
+                 .joint_left = JOINT_TRIES};
     const bst_common_streak_options streak = {.max_sources = BST_PLATE_SOLVE_STARS,
                                               .least_snr = options->least_snr,
                                               .tangent_per_px = options->tangent_per_px};

@@ -40,6 +40,9 @@ static const double BRIGHT_SNR = 100.0;
 /* Share of the quality of a source's own path that a refined one keeps: its ends, by all stars, are
  * more accurate, unless crowded stars have moved them to wrong places. */
 static const double LEAST_REFINED = 0.9;
+/* A shape where streaks overlap is brighter than either: the light along which its path is extended
+ * is this share of its own. */
+static const double EXTENDED_SHARE = 0.5;
 /* Ends of paths that are the same, px. */
 static const double SAME_ENDS_PX = 3.0;
 /* Least SNR of the stars that refine the path. */
@@ -273,13 +276,36 @@ static bst_star_path_image image_of(const finder *f) {
     return (bst_star_path_image){f->smooth, f->width, f->height};
 }
 
-/* Makes the path of a shape. */
-static bool fit_shape(finder *f, const bst_streak_shape *s) {
+/* Median of the light along the path at a place. */
+static double light_along(const finder *f, double x_px, double y_px) {
+    const bst_star_path_image image = image_of(f);
+    float values[BST_STAR_PATH_ROOM];
+    double m[3];
+    bst_star_path_map(&f->path, x_px, y_px, m);
+    for (int k = 0; k < f->path.count; k++) {
+        const double *u = f->path.place[k];
+        values[k] = (float)bst_star_path_image_at(&image, x_px + m[0] * u[0] + m[1] * u[1],
+                                                  y_px + m[1] * u[0] + m[2] * u[1]);
+    }
+    return fmax((double)median(values, f->path.count), 1.0);
+}
+
+/* Makes the path of a shape.
+ *
+ * Given:     extend  along the light of the source beyond the shape's ends */
+static bool fit_shape(finder *f, const bst_streak_shape *s, bool extend) {
     const bst_star_path_image image = image_of(f);
     double x, y;
     memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
     bst_streak_finder_flood(f, s->level, s->from, 1);
-    return bst_star_path_fit(&f->path, &image, f->stack, f->count, &x, &y);
+    if (!bst_star_path_fit(&f->path, &image, f->stack, f->count, &x, &y)) {
+        return false;
+    }
+    if (extend) {
+        const bst_star_path_star own = {x, y, EXTENDED_SHARE * light_along(f, x, y)};
+        bst_star_path_refine(&f->path, &image, &own, 1);
+    }
+    return true;
 }
 
 /* True for what the subtraction of a brighter source left. */
@@ -421,7 +447,7 @@ static void note_path(finder *f, const bst_star_path *path) {
     }
 }
 
-bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *f, int index,
+bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *f, int index, bool extend,
                                      bst_star_path *path, double *quality) {
     assert(f && path && quality && index >= BST_STREAK_FINDER_POINT && index < f->shape_count);
     bst_common_streak found;
@@ -434,7 +460,7 @@ bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *f, int ind
         *path = f->path;
         return BST_OK;
     }
-    if (!fit_shape(f, &f->shapes[index]) || is_known(f)) {
+    if (!fit_shape(f, &f->shapes[index], extend) || is_known(f)) {
         return BST_OK;
     }
     note_path(f, &f->path);
@@ -472,7 +498,7 @@ bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
     double quality;
     bst_star_path path;
     f->measured_count = 0;
-    BST_TRY(bst_streak_finder_measure(ctx, f, index, &path, &quality));
+    BST_TRY(bst_streak_finder_measure(ctx, f, index, false, &path, &quality));
     if (!(quality > 0.0)) {
         return BST_OK;
     }

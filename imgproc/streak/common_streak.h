@@ -62,12 +62,14 @@ bool bst_streak_finder_is_cut(const bst_streak_finder *finder, int index);
  * subtracted (Hogbom 1974, A&AS 15, 417). They then give a better path.
  *
  * Given:     index    BST_STREAK_FINDER_POINT, or 0 to bst_streak_finder_shapes - 1
+ *            extend   the shape may be a piece of a streak: its path is extended along the light
  * Returned:  path     the path
  *            quality  how well the brightest stars fit it: the best path of a frame has the
  *                     greatest; 0: no path, or one that has been measured before
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *finder, int index,
-                                     bst_star_path *path, double *quality) BST_MUST_CHECK;
+                                     bool extend, bst_star_path *path,
+                                     double *quality) BST_MUST_CHECK;
 
 /* Finds all stars by a path, also those whose middle is outside the frame.
  *
@@ -99,7 +101,7 @@ const bst_star_path *bst_streak_finder_path(const bst_streak_finder *finder);
  * together on the pixels, and the filter searches what is left for fainter ones, with weights for
  * the light of the known ones, and so on (cf. DAOPHOT, Stetson 1987, PASP 99, 191).
  *
- * Given:     finder        made with known_path
+ * Given:     finder        also one without known_path
  *            path          copied; centre and tangent_per_px as for this frame
  *            least_snr     of the part of a streak inside the frame
  *            least_inside  share of the path that must be inside the frame

@@ -221,11 +221,10 @@ static void sum_light(bst_path_filter *f, int block) {
 
 /* One over the noise of the response at the places of a block, from the sums of squares there. */
 BST_CLONES
-static void invert_noise(float *values, double squares, double least_inside, double correlation) {
+static void invert_noise(float *values, float least, float correlation) {
     for (int i = 0; i < BLOCK * BLOCK; i++) {
-        double share = (double)values[i] / squares;
-        double v = 1.0 / sqrt(share * squares * correlation);
-        values[i] = share < least_inside ? 0.0f : (float)v;
+        float v = 1.0f / sqrtf(values[i] * correlation);
+        values[i] = values[i] < least ? 0.0f : v;
     }
 }
 
@@ -262,7 +261,7 @@ static void filter_block(bst_path_filter *f, int block) {
         }
     } else {
         BST_SIMD_PICK(sum_block)(s->weights, s->squared, s->count, f->stride, per_noise);
-        invert_noise(per_noise, f->squares, f->least_inside, f->correlation);
+        invert_noise(per_noise, (float)(f->least_inside * f->squares), (float)f->correlation);
     }
     leave_out_beyond(f, block);
     sum_light(f, block);
@@ -373,7 +372,7 @@ static float snr_at(const bst_path_filter *f, int x, int y) {
 }
 
 double bst_path_filter_spread(const bst_path_filter *f) {
-    assert(f);
+    assert(f && f->subtractions == 0);
     double spread = 1.0;
     const int places = f->blocks * BLOCK * BLOCK;
     const int stride = places / SPREAD_PLACES | 1; /* odd: columns do not repeat */

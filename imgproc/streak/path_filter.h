@@ -48,8 +48,11 @@ bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
 void bst_path_filter_free(bst_path_filter *filter);
 
 /* Standard deviation of the response over that of white noise: the root mean square of what is
- * below zero and not below CLIP standard deviations, where no stars are. 1: too few places are
- * searched. */
+ * below zero and not below three standard deviations, where no stars are. 1: too few places are
+ * searched.
+ *
+ * Given:     filter  before its first subtraction: later, only a part of the response is up to date
+ */
 double bst_path_filter_spread(const bst_path_filter *filter);
 
 /* A maximum of the response. */
@@ -62,19 +65,23 @@ typedef struct bst_path_filter_peak {
     bool whole; /* a maximum on all sides, not one at the limit of what is searched */
 } bst_path_filter_peak;
 
-/* Highest maximum in SNR. Returns false if no value is positive. */
+/* Highest maximum in SNR. Filters the places again that may hold it. Returns false if no value is
+ * positive. */
 bool bst_path_filter_highest(bst_path_filter *filter, bst_path_filter_peak *out);
 
 /* Subtracts the response to a star (Hogbom 1974, A&AS 15, 417).
  *
- * Notes:     The star is subtracted from the image. The response can only fall, so places are
- *            filtered again when their former response is the highest of all. */
+ * Given:     peak  of positive amplitude
+ *
+ * Notes:     The star is subtracted from the filter's copy of the image. The response can only
+ *            fall, so places are filtered again when their former response is the highest of all.
+ *            An amplitude below zero would raise responses that are then missed. */
 void bst_path_filter_subtract(bst_path_filter *filter, const bst_path_filter_peak *peak);
 
-/* Subtracts the response to a point source of the image.
+/* Subtracts the response to a point source of the image, as bst_path_filter_subtract does.
  *
  * Given:     x_px, y_px  its place
- *            amplitude   value of the convolved image there */
+ *            amplitude   value of the convolved image there, positive */
 void bst_path_filter_subtract_point(bst_path_filter *filter, double x_px, double y_px,
                                     double amplitude);
 

@@ -207,20 +207,28 @@ static void list_stars(finder *f, const bst_streak_deblend *d, bst_common_streak
 
 bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *f, const bst_star_path *path,
                                     double least_snr, double least_inside, bst_common_streak *out) {
-    assert(f && f->options.known_path && path && path->count > 0 && least_snr > 0.0 &&
-           least_inside > 0.0 && out);
-    f->path = *path;
+    assert(f && path && path->count > 0 && least_snr > 0.0 && least_inside > 0.0 && out);
+    const size_t pixels = (size_t)f->width * (size_t)f->height;
+    if (path != &f->path) {
+        f->path = *path;
+    }
     *out = (bst_common_streak){.items = f->items, .sigma = f->sigma};
     for (int e = 0; e < 2; e++) {
         out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
     }
-    float *weights = malloc((size_t)f->width * (size_t)f->height * sizeof *weights);
+    /* behind the weights: the images that the search of shapes needs again */
+    const size_t kept = f->options.known_path ? 0 : 2 * pixels;
+    float *weights = malloc((pixels + kept) * sizeof *weights);
     bst_streak_deblend d = {.width = 0};
     bst_status status = BST_OK;
     if (!weights) {
         status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for weights of %d x %d px", f->width,
                           f->height);
     } else {
+        if (kept > 0) {
+            memcpy(weights + pixels, f->smooth, pixels * sizeof *weights);
+            memcpy(weights + 2 * pixels, f->lines, pixels * sizeof *weights);
+        }
         const bst_streak_deblend_config config = {.width = f->width,
                                                   .height = f->height,
                                                   .room = f->options.max_sources,
@@ -236,6 +244,10 @@ bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *f, const bs
         bst_streak_deblend_finish(&d, systematic_of(path));
         out->sigma = f->sigma * sqrt(d.noise2);
         list_stars(f, &d, out);
+    }
+    if (weights && kept > 0) {
+        memcpy(f->smooth, weights + pixels, pixels * sizeof *weights);
+        memcpy(f->lines, weights + 2 * pixels, pixels * sizeof *weights);
     }
     bst_streak_deblend_free(&d);
     free(weights);

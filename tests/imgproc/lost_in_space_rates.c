@@ -112,8 +112,8 @@ static void try_field(const arguments *a, int f, uint64_t i, const bst_stars *st
     bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
     options.false_rate = a->false_rate;
     options.max_stars = (int)a->stars;
-    const bst_lost_in_space_frame frame = {sky.items,   sky.count,  {0, 0, 1024, 1024},
-                                           limits_v[f], &sky.light, NULL};
+    const bst_lost_in_space_frame frame = {
+        sky.items, sky.count, {0, 0, 1024, 1024}, limits_v[f], &sky.light, NULL, NULL};
     bst_lost_in_space_result r;
     double begin = cpu_s();
     bst_assert_ok(&ctx, bst_lost_in_space_solve(&ctx, lost, &options, &frame, &r));

@@ -268,8 +268,8 @@ static void solve_known(const scene *s, bst_lost_in_space *lost, const bst_plate
     bst_assert_ok(&ctx, bst_streak_finder_follow(&ctx, finder, &path, o->least_snr, 0.25, &found));
     bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
     options.scale_tolerance = o->scale_tolerance;
-    const bst_lost_in_space_frame frame = {found.items, found.count, {0, 0, s->side, s->side},
-                                           o->v_limit,  o->light,    &path};
+    const bst_lost_in_space_frame frame = {
+        found.items, found.count, {0, 0, s->side, s->side}, o->v_limit, o->light, &path, NULL};
     bst_assert_ok(&ctx, bst_lost_in_space_solve(&ctx, lost, &options, &frame, &out->attitude));
     out->stars = found.count;
     out->ends[0] = found.ends[0];
@@ -321,12 +321,13 @@ int main(int argc, char **argv) {
             const bst_common_streak_point *e = r.ends;
             printf(
                 "# field %d: %s, %d usable stars, %d found, streak %.1f px, off %.1f px, scale "
-                "%.5f, true %.5f, chance e^%.1f, %d quads, %d patterns, %d candidates, margin "
+                "%.5f, true %.5f, chance e^%.1f (least e^%.1f), %d quads, %d patterns, %d "
+                "candidates, margin "
                 "%.1f, %.0f ms\n",
                 (int)i, r.attitude.solved ? "wrong" : "not solved", s.usable, r.stars,
                 hypot(e[1].x_px - e[0].x_px, e[1].y_px - e[0].y_px), off, r.attitude.scale, s.scale,
-                r.attitude.log_chance, r.attitude.quads, r.attitude.patterns, r.attitude.candidates,
-                r.ends_margin, ms[tried - 1]);
+                r.attitude.log_chance, r.attitude.least_log_chance, r.attitude.quads,
+                r.attitude.patterns, r.attitude.candidates, r.ends_margin, ms[tried - 1]);
         }
         bst_lost_in_space_free(lost);
     }

@@ -237,7 +237,7 @@ static void ends_of_a_long_path(void **state) {
     double quality;
     bst_assert_ok(&ctx, bst_streak_finder_create(&ctx, pixels, WIDTH, HEIGHT, &options, &finder));
     assert_true(bst_streak_finder_shapes(finder) >= 1);
-    bst_assert_ok(&ctx, bst_streak_finder_measure(&ctx, finder, 0, &found, &quality));
+    bst_assert_ok(&ctx, bst_streak_finder_measure(&ctx, finder, 0, false, &found, &quality));
     assert_true(quality > 0.0 && found.count > 1000);
     bst_assert_close(found.margin[0], 0.0, 0.0);
     bst_assert_close(found.margin[1], 0.0, 0.0);

@@ -41,8 +41,8 @@ static void solve_window(scene *s, int count, bst_window window) {
     bst_assert_ok(&s->ctx, bst_lost_in_space_create(&s->ctx, &s->drawn.camera, s->onboard,
                                                     s->patterns, YEAR, BST_RANDOM_SKY_ROOM, &lost));
     const bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
-    const bst_lost_in_space_frame frame = {s->drawn.items, count,           window,
-                                           V_LIMIT,        &s->drawn.light, NULL};
+    const bst_lost_in_space_frame frame = {s->drawn.items,  count, window, V_LIMIT,
+                                           &s->drawn.light, NULL,  NULL};
     bst_assert_ok(&s->ctx, bst_lost_in_space_solve(&s->ctx, lost, &options, &frame, &s->result));
     bst_lost_in_space_free(lost);
 }
