@@ -47,17 +47,19 @@ CURVES = {"flash": flash, "fade": fade, "dark": dark}
 CASES = ("flash", "fade", "thrust", "dark")
 
 
-def overrides(case, folder):
-    """Values of the scenario for a case; writes its light curve into `folder`."""
+def overrides(case, folder, seed):
+    """Values of the scenario for a case; writes its light curve into `folder`. The period begins at another time with
+    each seed."""
     if case == "thrust":
         return {"/world/objects/0/orbit": ORBIT,
                 "/world/objects/0/burns": [{"time_s": 100, "duration_s": 200, "dv_rtn_mps": [0, 2000, 0]}]}
     path = os.path.join(folder, "curve.csv")
     with open(path, "w", encoding="utf-8") as file:
         file.write("time_s,factor\n")
+        later = 0.0 if case == "fade" else 0.618 * seed % 1.0 * 30.0
         # the light left 0.14 s before; steps take 0.01 s
         for k in range(-100, 100 * (DURATION_S + 1)):
-            file.write(f"{k / 100:.2f},{CURVES[case](k / 100):.6f}\n")
+            file.write(f"{k / 100:.2f},{CURVES[case](k / 100 + later):.6f}\n")
     return {"/world/objects/0/brightness": {"model": "light_curve", "light_curve_file": path}}
 
 
@@ -97,7 +99,7 @@ def main():
                 out = os.path.join(folder, "run")
                 values = {SENSOR + "/observation_source": "generator", "/record/frames": "none",
                           "/record/truth_stars": False, MODULES + "/tracker/type": tracker,
-                          **overrides(case, folder)}
+                          **overrides(case, folder, seed)}
                 runs.run(runs.TRACK, out, *(f"{key}={json.dumps(value)}" for key, value in values.items()), *more,
                          seed=7000 + seed, duration=DURATION_S)
                 results.append(judge(out))
