@@ -21,7 +21,7 @@ import runs
 
 SENSOR = runs.SENSOR
 MODULES = SENSOR + "/modules"
-DURATION_S = 330
+DURATION_S, DARK_DURATION_S = 330, 630
 VISIBLE_SNR = 5.0
 MOST_PX = 0.4
 # as in test_manoeuvre.py: a geostationary orbit in sight of the observer, integrated so that a burn may last
@@ -58,7 +58,7 @@ def overrides(case, folder, seed):
         file.write("time_s,factor\n")
         later = 0.0 if case == "fade" else 0.618 * seed % 1.0 * 30.0
         # the light left 0.14 s before; steps take 0.01 s
-        for k in range(-100, 100 * (DURATION_S + 1)):
+        for k in range(-100, 100 * (DARK_DURATION_S + 1)):
             file.write(f"{k / 100:.2f},{CURVES[case](k / 100 + later):.6f}\n")
     return {"/world/objects/0/brightness": {"model": "light_curve", "light_curve_file": path}}
 
@@ -101,7 +101,8 @@ def main():
                           "/record/truth_stars": False, MODULES + "/tracker/type": tracker,
                           **overrides(case, folder, seed)}
                 runs.run(runs.TRACK, out, *(f"{key}={json.dumps(value)}" for key, value in values.items()), *more,
-                         seed=7000 + seed, duration=DURATION_S)
+                         seed=7000 + seed,
+                         duration=DARK_DURATION_S if case == "dark" else DURATION_S)
                 results.append(judge(out))
                 print(tracker, case, seed, *results[-1], file=sys.stderr)
                 runs.clean()

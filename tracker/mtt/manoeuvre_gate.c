@@ -107,16 +107,15 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
         if (best.column < 0) {
             continue;
         }
-        track->state = h.state;
-        track->models = h.models;
-        /* otherwise the wider covariance of this frame suffices */
         if (!best.steady) {
+            track->state = h.state;
+            track->models = h.models;
             track->manoeuvre_end_s = m->now.seconds + p->manoeuvre_sojourn_s;
         }
         m->detection_of_track[t] = best.column;
         m->now.used[best.column] = true;
         m->owner[best.column] = t;
-        if (exp(-0.5 * best.quiet_chi2) < allowed &&
+        if (!best.steady && exp(-0.5 * best.quiet_chi2) < allowed &&
             (1.0 - p->detection_probability) * best.alarms < allowed) {
             m->departed_chi2[t] = best.quiet_chi2;
         }
