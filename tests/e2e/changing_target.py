@@ -21,7 +21,8 @@ import runs
 
 SENSOR = runs.SENSOR
 MODULES = SENSOR + "/modules"
-DURATION_S, DARK_DURATION_S = 330, 630
+# after 540 s too few stars of the embedded catalogue are in the field
+DURATION_S, DARK_DURATION_S = 330, 500
 VISIBLE_SNR = 5.0
 MOST_PX = 0.4
 # as in test_manoeuvre.py: a geostationary orbit in sight of the observer, integrated so that a burn may last
