@@ -50,6 +50,17 @@ static bool is_taken(const bst_mtt *m, int column) {
     return m->now.used[column] && !begun;
 }
 
+/* True if no other confirmed track is so near that they may share detections. */
+static bool is_alone(const bst_mtt *m, int t) {
+    bool alone = m->tracks[t].merged_in_row == 0;
+    double reach = 3.0 * m->params.merge_rad;
+    for (int u = 0; u < m->track_count && alone; u++) {
+        bst_vec3 off = bst_vec3_sub(m->tracks[u].state.direction, m->tracks[t].state.direction);
+        alone = u == t || m->tracks[u].status == BST_TRACK_TENTATIVE || bst_vec3_norm(off) > reach;
+    }
+    return alone;
+}
+
 /* Likeliest unused detection that a manoeuvre explains better than the quiet model, or that neither
  * clutter nor the gate's edge explains: between the gate and the place where a manoeuvre is likelier
  * there is no detection that a held track should leave to a new one. */
@@ -75,8 +86,8 @@ static choice choose_detection(const bst_mtt *m, int t, const hypothesis *h) {
         }
         double manoeuvre = h->log_prior + fit.log_likelihood;
         bool steady = quiet.log_likelihood > manoeuvre;
-        if (steady && quiet.chi2 <= p->gate_chi2) {
-            continue; /* the association has judged it */
+        if (steady && (quiet.chi2 <= p->gate_chi2 || !is_alone(m, t))) {
+            continue; /* the association has judged it, or it may be a neighbour's */
         }
         double cost = -fmax(manoeuvre, quiet.log_likelihood) + log(m->clutter_density) -
                       log(p->detection_probability) +
