@@ -8,28 +8,31 @@
 #include "imgproc/measure/source_moments.h"
 #include "sim/core/cholesky.h"
 
-/* The test by second derivatives, taken as differences between pixels, finds at least this share of the gain of a
- * pair (tests/imgproc/pair_resolution.c). */
+/* The test by second derivatives, taken as differences between pixels, finds at least this share of
+ * the gain of a pair (tests/imgproc/pair_resolution.c). */
 static const double FOUND_SHARE = 0.4;
 /* Shares of the light in the fainter source from which the fit starts: equal and 4:1. */
 static const double START_SHARE[3] = {0.5, 0.2, 0.8};
-/* A pair farther apart than NEAR_FWHM needs more gain: noise anywhere on the stamp, of some 16 places, may be its second source;
- * exp(-5.5 / 2) is 1/16. */
+/* A pair farther apart than NEAR_FWHM needs more gain: noise anywhere on the stamp, of some 16
+ * places, may be its second source; exp(-5.5 / 2) is 1/16. */
 static const double NEAR_FWHM = 1.0, ELSEWHERE = 5.5;
-/* A streak of unknown rate is preferred to a pair if its chi-square is lower by this: a likelihood ratio of exp(2) = 7, a
- * design choice. Fainter ones cannot be told apart (tests/imgproc/pair_resolution.c, `moving`). */
+/* A streak of unknown rate is preferred to a pair if its chi-square is lower by this: a likelihood
+ * ratio of exp(2) = 7, a design choice. Fainter ones cannot be told apart
+ * (tests/imgproc/pair_resolution.c, `moving`). */
 static const double STREAK_LEAD = 4.0;
-/* Least number of bright sources whose median width is preferred to that of the known PSF, and the most of which it is
- * taken: design choices. */
-/* SNR of those: well above the one from which widths are fitted (imgproc/measure/locate.c), which selects by the peak and so
- * the narrower ones. */
+/* Least number of bright sources whose median width is preferred to that of the known PSF, and the
+ * most of which it is taken: design choices. */
+/* SNR of those: well above the one from which widths are fitted (imgproc/measure/locate.c), which
+ * selects by the peak and so the narrower ones. */
 static const double WIDTH_SNR = 25.0;
 enum { LEAST_WIDTHS = 5, MOST_WIDTHS = 255 };
 
-/* Coefficients of the second derivatives (xx, xy, yy) of the single source's image in its residuals, px^2; and the drop
- * of chi-square by them. The latest fit on the stamp must be that of the source. False: not determined. */
-static bool find_elongation(const bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
-                            const bst_imgproc_source *s, double out[3], double *gain) {
+/* Coefficients of the second derivatives (xx, xy, yy) of the single source's image in its
+ * residuals, px^2; and the drop of chi-square by them. The latest fit on the stamp must be that of
+ * the source. False: not determined. */
+static bool find_elongation(const bst_fit *fit, const bst_fit_data *data,
+                            const bst_imgproc_stamp *stamp, const bst_imgproc_source *s,
+                            double out[3], double *gain) {
     enum { N = 6 };
     const int stride = bst_simd_layout_round_up(stamp->width), n = stride * stamp->height;
     const float *m = fit->model;
@@ -42,15 +45,15 @@ static bool find_elongation(const bst_fit *fit, const bst_fit_data *data, const 
             }
             double middle = (double)m[k];
             double share = middle + s->widening_px2 * (double)m[k + 3 * n];
-            double j[N] = {share,
-                           s->flux_e * (double)m[k + n],
-                           s->flux_e * (double)m[k + 2 * n],
-                           0.5 * s->flux_e * ((double)m[k + 1] + (double)m[k - 1] - 2.0 * middle),
-                           0.25 * s->flux_e *
-                               ((double)m[k + stride + 1] + (double)m[k - stride - 1] -
-                                (double)m[k + stride - 1] - (double)m[k - stride + 1]),
-                           0.5 * s->flux_e *
-                               ((double)m[k + stride] + (double)m[k - stride] - 2.0 * middle)};
+            double j[N] = {
+                share,
+                s->flux_e * (double)m[k + n],
+                s->flux_e * (double)m[k + 2 * n],
+                0.5 * s->flux_e * ((double)m[k + 1] + (double)m[k - 1] - 2.0 * middle),
+                0.25 * s->flux_e *
+                    ((double)m[k + stride + 1] + (double)m[k - stride - 1] -
+                     (double)m[k + stride - 1] - (double)m[k - stride + 1]),
+                0.5 * s->flux_e * ((double)m[k + stride] + (double)m[k - stride] - 2.0 * middle)};
             double model = (double)fit->fixed[k] + s->flux_e * share;
             double weight = 1.0 / (data->noise_e * data->noise_e + data->excess * fmax(model, 0.0));
             double r = (double)fit->value[k] - model;
@@ -79,14 +82,14 @@ static bool find_elongation(const bst_fit *fit, const bst_fit_data *data, const 
     return true;
 }
 
-/* Place and light of the brightest 3 x 3 pixels of the single source's residuals, and their SNR: a second source that is
- * so far away that the second derivatives do not describe it. */
+/* Place and light of the brightest 3 x 3 pixels of the single source's residuals, and their SNR: a
+ * second source that is so far away that the second derivatives do not describe it. */
 typedef struct residue {
     double x_px, y_px, flux_e, snr;
 } residue;
 
-static residue find_remainder(const bst_fit *fit, const bst_fit_data *data, const bst_imgproc_stamp *stamp,
-                                const bst_imgproc_source *s) {
+static residue find_remainder(const bst_fit *fit, const bst_fit_data *data,
+                              const bst_imgproc_stamp *stamp, const bst_imgproc_source *s) {
     const int stride = bst_simd_layout_round_up(stamp->width), n = stride * stamp->height;
     residue best = {.snr = 0.0};
     for (int y = 1; y + 1 < stamp->height; y++) {
@@ -94,7 +97,8 @@ static residue find_remainder(const bst_fit *fit, const bst_fit_data *data, cons
             double sum = 0.0, variance = 0.0;
             for (int c = 0; c < 9; c++) {
                 int k = (y + c / 3 - 1) * stride + x + c % 3 - 1;
-                double share = (double)fit->model[k] + s->widening_px2 * (double)fit->model[k + 3 * n];
+                double share =
+                    (double)fit->model[k] + s->widening_px2 * (double)fit->model[k + 3 * n];
                 double model = (double)fit->fixed[k] + s->flux_e * share;
                 sum += (double)fit->value[k] - model;
                 variance += data->noise_e * data->noise_e + data->excess * fmax(model, 0.0);
@@ -108,14 +112,16 @@ static residue find_remainder(const bst_fit *fit, const bst_fit_data *data, cons
 }
 
 /* True if the light of a source is whole and its own. */
-static bool is_whole(const bst_locate_frame *f, const bst_imgproc_found *found, const bst_imgproc_stamp *stamp) {
+static bool is_whole(const bst_locate_frame *f, const bst_imgproc_found *found,
+                     const bst_imgproc_stamp *stamp) {
     if (!found->source.fitted || found->dropped || found->rough || found->bleed ||
         found->charge.pixels > 0 || found->label != BST_LABEL_UNKNOWN ||
         (found->flags & BST_DETECTION_BLEND)) {
         return false;
     }
     for (int y = 0; y < stamp->height; y++) {
-        const float *row = f->signal + (size_t)(stamp->y0 + y) * (size_t)f->width + (size_t)stamp->x0;
+        const float *row =
+            f->signal + (size_t)(stamp->y0 + y) * (size_t)f->width + (size_t)stamp->x0;
         for (int x = 0; x < stamp->width; x++) {
             if (!(row[x] > BST_PIXEL_NONE)) {
                 return false;
@@ -130,7 +136,8 @@ static bool is_whole(const bst_locate_frame *f, const bst_imgproc_found *found, 
 }
 
 /* Start of a pair with the share `faint` of the light in the second source, `d` from the first. */
-static void start_pair(const bst_imgproc_source *from, double faint, const double d[2], bst_imgproc_source out[2]) {
+static void start_pair(const bst_imgproc_source *from, double faint, const double d[2],
+                       bst_imgproc_source out[2]) {
     out[0] = out[1] = *from;
     out[0].flux_e = (1.0 - faint) * from->flux_e;
     out[1].flux_e = faint * from->flux_e;
@@ -157,10 +164,12 @@ static double own_streak(const bst_imgproc_worker *w, int i, const bst_imgproc_s
         return INFINITY;
     }
     bst_source_moments_own_streak(w, i, &streak);
-    return streak.streak && bst_deblend_fit(w, i, &streak, stamp, false) ? streak.source.chi_square : INFINITY;
+    return streak.streak && bst_deblend_fit(w, i, &streak, stamp, false) ? streak.source.chi_square
+                                                                         : INFINITY;
 }
 
-bool bst_pair_fit(const bst_imgproc_worker *w, int i, double widening_px2, double least_gain, bst_pair *out) {
+bool bst_pair_fit(const bst_imgproc_worker *w, int i, double widening_px2, double least_gain,
+                  bst_pair *out) {
     assert(w && out && i >= 0 && i < w->l->count);
     const bst_locate_frame *f = w->f;
     const bst_imgproc_found *found = &w->l->found[i];
@@ -218,7 +227,8 @@ bool bst_pair_fit(const bst_imgproc_worker *w, int i, double widening_px2, doubl
     double dx = out->source[1].shape.x_px - out->source[0].shape.x_px;
     double dy = out->source[1].shape.y_px - out->source[0].shape.y_px;
     double apart = hypot(dx, dy) / (BST_FWHM_PER_SIGMA * f->sigma_px);
-    if (!(out->gain > least_gain + (apart > NEAR_FWHM ? ELSEWHERE : 0.0)) || own_streak(w, i, &stamp) <= lowest - STREAK_LEAD) {
+    if (!(out->gain > least_gain + (apart > NEAR_FWHM ? ELSEWHERE : 0.0)) ||
+        own_streak(w, i, &stamp) <= lowest - STREAK_LEAD) {
         return false;
     }
     if (out->source[1].flux_e > out->source[0].flux_e) {
@@ -228,7 +238,8 @@ bool bst_pair_fit(const bst_imgproc_worker *w, int i, double widening_px2, doubl
     }
     /* a fit has the covariance of its first source */
     for (int k = 1; k >= 0; k--) {
-        bst_imgproc_source copy[2] = {out->source[k], out->source[1 - k]}, *both[2] = {&copy[0], &copy[1]};
+        bst_imgproc_source copy[2] = {out->source[k], out->source[1 - k]},
+                           *both[2] = {&copy[0], &copy[1]};
         bst_fit_request request = single;
         request.free = both;
         request.free_count = 2;
@@ -256,15 +267,16 @@ static int ascending(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* Median widening of the bright sources: pairs among them, which look wider, do not move it much. */
+/* Median widening of the bright sources: pairs among them, which look wider, do not move it much.
+ */
 static double median_widening(const bst_imgproc_locator *l, const bst_locate_frame *f, int fits) {
     double all[MOST_WIDTHS];
     int count = 0;
     for (int i = 0; i < fits && count < MOST_WIDTHS; i++) {
         const bst_imgproc_found *found = &l->found[i];
         double snr = found->source.flux_e * bst_locate_norm(f, found->streak) / found->noise_e;
-        if (snr > WIDTH_SNR && found->source.fitted && found->source.widening_variance > 0.0 && !found->bleed &&
-            !found->dropped) {
+        if (snr > WIDTH_SNR && found->source.fitted && found->source.widening_variance > 0.0 &&
+            !found->bleed && !found->dropped) {
             all[count++] = found->source.widening_px2;
         }
     }

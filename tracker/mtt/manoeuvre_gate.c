@@ -62,8 +62,8 @@ static bool is_alone(const bst_mtt *m, int t) {
 }
 
 /* Likeliest unused detection that a manoeuvre explains better than the quiet model, or that neither
- * clutter nor the gate's edge explains: between the gate and the place where a manoeuvre is likelier
- * there is no detection that a held track should leave to a new one. */
+ * clutter nor the gate's edge explains: between the gate and the place where a manoeuvre is
+ * likelier there is no detection that a held track should leave to a new one. */
 static choice choose_detection(const bst_mtt *m, int t, const hypothesis *h) {
     const bst_mtt_params *p = &m->params;
     const bst_mtt_track *track = &m->tracks[t];

@@ -86,8 +86,8 @@ static bool has_faded(const bst_mtt *m, const bst_mtt_track *track, double secon
            seconds - track->last_update_s > FADED_SHARE * m->params.max_coast_s;
 }
 
-/* Predicts the probability that the object of a track is dark: a Markov chain of two states. Only an
- * object that the cue expects is waited for. */
+/* Predicts the probability that the object of a track is dark: a Markov chain of two states. Only
+ * an object that the cue expects is waited for. */
 static void predict_darkness(bst_mtt_track *track, double dt_s, const bst_mtt_frame *frame) {
     bool waits = track->status != BST_TRACK_TENTATIVE && !track->star && !track->asleep &&
                  frame->expected && frame->expected(frame->user, track);
