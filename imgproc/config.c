@@ -19,6 +19,10 @@ const bst_config_desc bst_imgproc_config_table[] = {
         "those that are taken for objects; the others stand at the matched filter's greatest "
         "output. 0: all."),
     BST_FORMER("most_fits", "max_fits"),
+    BST_REAL(bst_imgproc_config, false_splits, "", 0, 0.1, "0",
+             "Share of single sources that may be reported as two by noise: pairs closer than the "
+             "matched filter separates are then found by a likelihood ratio. 0: no such test. The "
+             "PSF, with jitter_px, must be known."),
     BST_INT(bst_imgproc_config, mesh_px, "px", 8, 1024, "64",
             "Side of the meshes in which background and noise are estimated."),
     BST_REAL(bst_imgproc_config, false_alarms_per_frame, "", 1e-6, 1e4, "1",

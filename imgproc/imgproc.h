@@ -32,6 +32,7 @@ extern const bst_config_desc bst_reference_pixels_config_table[];
 typedef struct bst_imgproc_config {
     int64_t capacity;              /* detections per frame */
     int64_t max_fits;              /* number of brightest detections located by a fit; 0: all */
+    double false_splits;           /* share of single sources split by noise; 0: no pair test */
     int64_t mesh_px;               /* side of a background mesh */
     double false_alarms_per_frame; /* expected from noise alone */
     double jitter_px;              /* RMS jitter per axis by which the PSF is broadened */

@@ -61,6 +61,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     const bst_streak_locator_limits streaks = {width, height, fwhm, ip->config.streak_search_px};
     BST_TRY(bst_imgproc_locator_create(ctx, ip->known, &limits, &ip->locator));
     ip->locator.max_fits = (int)ip->config.max_fits;
+    ip->locator.false_splits = ip->config.false_splits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     BST_TRY(bst_imgproc_open_silhouettes(ctx, ip));
     return ip->config.streak_search_px > 0.0

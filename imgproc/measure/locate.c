@@ -7,6 +7,7 @@
 
 #include "imgproc/detect/blooming.h"
 #include "imgproc/measure/cosmic_ray.h"
+#include "imgproc/measure/pair_split.h"
 #include "imgproc/measure/peak_centroid.h"
 #include "imgproc/measure/source_moments.h"
 #include "sim/core/pages.h"
@@ -500,6 +501,9 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
         process_group(l, f, fits, l->count, locate_at_peak);
     }
     process_group(l, f, 0, fits, second_fit);
+    if (l->false_splits > 0.0) {
+        bst_pair_split(l, f, fits, l->false_splits);
+    }
     process_group(l, f, 0, l->count, finish_source);
 }
 

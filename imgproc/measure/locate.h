@@ -62,6 +62,7 @@ typedef struct bst_imgproc_locator {
     bst_imgproc_peak_law law[2]; /* of a point, and of a star streak at the frame's centre */
     int max_side, capacity;
     int max_fits;                    /* number of brightest sources that are fitted; 0: all */
+    double false_splits;             /* share of single sources reported as two; 0: no pair test */
     bst_imgproc_found *found, *next; /* [capacity]; next: results of a loop */
     int *from;                       /* [capacity]: candidate of each source */
     uint8_t *chosen;                 /* per candidate: it is selected */

@@ -7,7 +7,8 @@ PROGRAM is test_tracker_close_objects: it writes the detections and scores the t
 trackers are judged by the same code. GNN (two-dimensional assignment), JPDA and MFA (multi-frame
 assignment) are tuned per scene over GRID, by the mean GOSPA of the first `--tune` seeds, and then
 run with the best over `--seeds`. With `--shared` GNN, which is the fastest, is tuned for all three;
-`--kinds gnn jpda` leaves out MFA, which is the slowest. Stone Soup knows the motion model, the true
+`--settings 6 3 4 0.0067` tunes nothing; `--kinds gnn jpda` leaves out MFA, which is the slowest; `--first N`
+begins with seed N; `--each` prints the figures of each seed as well. Stone Soup knows the motion model, the true
 density of false alarms and the covariance of each detection.
 """
 
@@ -185,16 +186,27 @@ def main():
     parser.add_argument("--tune", type=int, default=1)
     parser.add_argument("--shared", action="store_true")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--settings", nargs=4, type=float)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--each", action="store_true")
     arguments = parser.parse_args()
     for scene in arguments.scenes or SCENES:
         best = None
+        if arguments.settings:
+            rate, points, patience, noise = arguments.settings
+            best = rate, int(points), int(patience), noise
         for kind in arguments.kinds:
             def tuned(settings, kind=kind, scene=scene):
                 return mean([run(arguments.program, kind, scene, seed, settings)
                              for seed in range(arguments.tune)], "gospa_px")
-            best = best if best and arguments.shared else min(GRID, key=tuned)
-            results = [run(arguments.program, kind, scene, seed, best)
-                       for seed in range(arguments.seeds)]
+            if not best or not (arguments.shared or arguments.settings):
+                best = min(GRID, key=tuned)
+            results = []
+            for seed in range(arguments.first, arguments.first + arguments.seeds):
+                results.append(run(arguments.program, kind, scene, seed, best))
+                if arguments.each:
+                    print(scene, kind, seed, *(f"{name} {value:.4g}"
+                                               for name, value in results[-1].items()), flush=True)
             print(scene, kind, "rate sigma, points, patience, noise", best,
                   *(f"{name} {mean(results, name):.4g}" for name in (*FIGURES, "us_per_frame")),
                   flush=True)

@@ -295,8 +295,8 @@ static void manoeuvres_and_flares_are_reported(void **state) {
             "filter %d: burns reported %d of 100 after %.1f frames, fadings %d after %.1f, "
             "%d too early\n",
             f, reported[0], delay[0] / reported[0], reported[1], delay[1] / reported[1], early);
-        /* the others leave the gate before they are reported: the track is lost */
-        assert_true(reported[0] >= (filters[f] == BST_FILTER_IMM ? 90 : 60));
+        /* 93 of the other filters: 5 standard deviations */
+        assert_true(reported[0] >= (filters[f] == BST_FILTER_IMM ? 90 : 80));
         assert_true(reported[1] >= 90);
         assert_true(early <= 1);
     }

@@ -151,14 +151,15 @@ static void dark_target(void **state) {
         run(seed, &o, &r);
         assert_int_equal(r.first_target_frame, -1);
     }
-    /* dark after 100 s of tracking: the track coasts and ends, and no neighbour takes its place */
+    /* dark after 100 s of tracking: the track coasts for max_coast_s, 120 s, and ends, and no
+     * neighbour takes its place */
     o.dark_from_s = 100;
     for (uint64_t seed = 0; seed < 10; seed++) {
         result r;
         run(seed, &o, &r);
         assert_true(r.first_target_frame >= 0);
         assert_int_equal(r.wrong, 0);
-        assert_in_range(r.in_track, 90, 120);
+        assert_in_range(r.in_track, 205, 221);
         assert_int_equal(r.target_changes, 2);
     }
 }

@@ -123,8 +123,8 @@ static void gate_tracks(bst_mtt *m) {
         double costs[BST_MTT_CANDIDATES];
         int count = bst_mtt_gate(m, t, columns, costs);
         bool firm = track->status != BST_TRACK_TENTATIVE;
-        double pd = track->may_miss || track->star ? m->params.detection_probability : 0.0;
-        double prior = log(track->existence) - log1p(-track->existence * pd);
+        double pd = bst_mtt_detectable(m, track);
+        double prior = log(track->existence * (1.0 - track->dark)) - log1p(-track->existence * pd);
         prior += count > 0 && !firm && m->params.merge_rad > 0.0 ? log_resolved(m, t) : 0.0;
         for (int i = 0; i < count; i++) {
             bst_joint_hypothesis h = {.column = columns[i],
@@ -215,7 +215,7 @@ static void marginalise(bst_mtt *m, const bst_joint_group *g) {
     for (int i = 0; i < g->members; i++) {
         int t = j->member[g->first_member + i];
         bst_mtt_track *track = &m->tracks[t];
-        double pd = track->may_miss || track->star ? m->params.detection_probability : 0.0;
+        double pd = bst_mtt_detectable(m, track);
         double r = track->existence, found = 0.0;
         j->missed[t] = lost[i] + missed[i] * r * (1.0 - pd) / (1.0 - r * pd);
         for (int h = j->head[t]; h >= 0; h = j->hypothesis[h].next) {
@@ -308,7 +308,7 @@ void bst_mtt_associate_jointly(bst_mtt *m) {
     for (int t = 0; t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
         if (j->head[t] < 0 && track->may_miss && m->observable[t] && !track->star) {
-            double r = track->existence, pd = m->params.detection_probability;
+            double r = track->existence, pd = bst_mtt_detectable(m, track);
             j->missed[t] = r * (1.0 - pd) / (1.0 - r * pd);
         }
     }

@@ -91,9 +91,7 @@ static int edge_of(bst_mtt_joint *j, bst_joint_group *g, int column) {
 /* ln of the probability that a track is missed or does not exist. */
 static double log_missed(const bst_mtt *m, int t) {
     const bst_mtt_track *track = &m->tracks[t];
-    return track->may_miss || track->star
-               ? log1p(-track->existence * m->params.detection_probability)
-               : 0.0;
+    return log1p(-track->existence * bst_mtt_detectable(m, track));
 }
 
 /* Adds the shared detections of a link. */
@@ -102,8 +100,9 @@ static void merge_link(bst_mtt *m, bst_joint_group *g, bst_joint_link *link) {
     int ta = j->member[g->first_member + link->a], tb = j->member[g->first_member + link->b];
     const bst_mtt_track *a = &m->tracks[ta], *b = &m->tracks[tb];
     double pd = m->params.detection_probability;
-    double prior =
-        log(a->existence * b->existence * link->unresolved) - log_missed(m, ta) - log_missed(m, tb);
+    double seen = (1.0 - a->dark) * (1.0 - b->dark);
+    double prior = log(a->existence * b->existence * seen * link->unresolved) - log_missed(m, ta) -
+                   log_missed(m, tb);
     link->log_miss = prior + log(1.0 - pd);
     link->first = j->hypotheses;
     link->count = 0;

@@ -17,6 +17,7 @@ typedef struct choice {
     double cost;       /* -ln of its likelihood ratio against clutter */
     double quiet_chi2; /* its misfit to the quiet model */
     double alarms;     /* expected number of false alarms at least as near */
+    bool steady;       /* outside of the gate, but likelier of the quiet model */
 } choice;
 
 /* True if a track without a detection is tested for a manoeuvre. */
@@ -41,7 +42,28 @@ static void inflate_for_manoeuvre(const bst_mtt *m, const bst_mtt_track *track, 
     }
 }
 
-/* Likeliest unused detection that a manoeuvre explains better than the quiet model. */
+/* True if a detection is of another track, which must be a confirmed one with BST_MTT_PMB: tracks
+ * that begin with the detections of a manoeuvring object must not take it from its own. */
+static bool is_taken(const bst_mtt *m, int column) {
+    bool begun = m->params.association == BST_MTT_PMB && m->joint.claimed[column] > 0.5 &&
+                 m->joint.claimed_firm[column] <= 0.5 && m->owner[column] == BST_MTT_NOBODY;
+    return m->now.used[column] && !begun;
+}
+
+/* True if no other confirmed track is so near that they may share detections. */
+static bool is_alone(const bst_mtt *m, int t) {
+    bool alone = m->tracks[t].merged_in_row == 0;
+    double reach = 3.0 * m->params.merge_rad;
+    for (int u = 0; u < m->track_count && alone; u++) {
+        bst_vec3 off = bst_vec3_sub(m->tracks[u].state.direction, m->tracks[t].state.direction);
+        alone = u == t || m->tracks[u].status == BST_TRACK_TENTATIVE || bst_vec3_norm(off) > reach;
+    }
+    return alone;
+}
+
+/* Likeliest unused detection that a manoeuvre explains better than the quiet model, or that neither
+ * clutter nor the gate's edge explains: between the gate and the place where a manoeuvre is
+ * likelier there is no detection that a held track should leave to a new one. */
 static choice choose_detection(const bst_mtt *m, int t, const hypothesis *h) {
     const bst_mtt_params *p = &m->params;
     const bst_mtt_track *track = &m->tracks[t];
@@ -54,20 +76,25 @@ static choice choose_detection(const bst_mtt *m, int t, const hypothesis *h) {
         int column = m->now.order[i];
         bst_filter_candidate candidate = {.measurement = &m->now.items[column].sky};
         bst_filter_fit quiet, fit;
-        if (m->now.used[column] ||
+        if (is_taken(m, column) ||
             bst_vec3_norm(bst_vec3_sub(candidate.measurement->direction, h->state.direction)) >
                 radius ||
             !bst_filter_evaluate(&m->filter, &track->state, &track->models, &candidate, &quiet) ||
             !bst_filter_evaluate(&m->filter, &h->state, &h->models, &candidate, &fit) ||
-            quiet.log_likelihood > h->log_prior + fit.log_likelihood || fit.chi2 > p->gate_chi2) {
+            fit.chi2 > p->gate_chi2) {
             continue;
         }
-        double cost = -h->log_prior - fit.log_likelihood + log(m->clutter_density) -
+        double manoeuvre = h->log_prior + fit.log_likelihood;
+        bool steady = quiet.log_likelihood > manoeuvre;
+        if (steady && (quiet.chi2 <= p->gate_chi2 || !is_alone(m, t))) {
+            continue; /* the association has judged it, or it may be a neighbour's */
+        }
+        double cost = -fmax(manoeuvre, quiet.log_likelihood) + log(m->clutter_density) -
                       log(p->detection_probability) +
                       bst_mtt_brightness_cost(track, &m->now.items[column]);
         if (cost < best.cost) {
             double area = BST_PI * fit.innovation.chi2 * exp(0.5 * fit.innovation.log_det_s);
-            best = (choice){column, cost, quiet.chi2, area * m->clutter_density};
+            best = (choice){column, cost, quiet.chi2, area * m->clutter_density, steady};
         }
     }
     return best;
@@ -91,13 +118,15 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
         if (best.column < 0) {
             continue;
         }
-        track->state = h.state;
-        track->models = h.models;
-        track->manoeuvre_end_s = m->now.seconds + p->manoeuvre_sojourn_s;
+        if (!best.steady) {
+            track->state = h.state;
+            track->models = h.models;
+            track->manoeuvre_end_s = m->now.seconds + p->manoeuvre_sojourn_s;
+        }
         m->detection_of_track[t] = best.column;
         m->now.used[best.column] = true;
         m->owner[best.column] = t;
-        if (exp(-0.5 * best.quiet_chi2) < allowed &&
+        if (!best.steady && exp(-0.5 * best.quiet_chi2) < allowed &&
             (1.0 - p->detection_probability) * best.alarms < allowed) {
             m->departed_chi2[t] = best.quiet_chi2;
         }

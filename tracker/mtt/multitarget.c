@@ -370,7 +370,7 @@ static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool obser
         return true;
     }
     if (track->status != BST_TRACK_TENTATIVE) {
-        return track->misses_in_row > p->max_misses;
+        return track->misses_in_row > p->max_misses && track->dark < 0.5;
     }
     int allowed = p->confirm_frames - p->confirm_hits;
     return (observed && track->misses_in_row > allowed) ||
@@ -494,6 +494,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     for (int t = 0; t < m->track_count; t++) {
         m->tracks[t].last_chi2 = -1.0;
         update_track(m, t);
+        bst_mtt_note_darkness(m, t);
     }
     for (int i = 0; i < m->now.count; i++) {
         unused += !m->now.used[i];

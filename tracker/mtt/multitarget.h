@@ -160,6 +160,7 @@ typedef struct bst_mtt_track {
     bool lit;      /* its orbit has predicted it visible at least once */
     bool replaced; /* replaced in this frame by the track identified with it */
     bool may_miss; /* a missing detection in the latest frame counts */
+    double dark;   /* probability that the object gives too little light, see visibility.h */
     /* running means over detections in full sunlight without selection bias; SNR, glow 0: none yet
      */
     double full_snr, full_v_mag, full_glow;

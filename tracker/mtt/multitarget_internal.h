@@ -129,6 +129,13 @@ int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns);
 /* Sets the visibility of predicted track t and whether it is dormant; updates observable (on entry:
  * in the field) and may_miss. */
 void bst_mtt_look(bst_mtt *mtt, int t, const bst_mtt_frame *frame);
+/* Probability that a frame detects the object of a track, if it exists. */
+static inline double bst_mtt_detectable(const bst_mtt *mtt, const bst_mtt_track *track) {
+    bool counts = track->may_miss || track->star;
+    return counts ? mtt->params.detection_probability * (1.0 - track->dark) : 0.0;
+}
+/* Updates the probability that the object of track t is dark, after the association. */
+void bst_mtt_note_darkness(const bst_mtt *mtt, int t);
 /* Updates a track's brightness in full sunlight after a detection, if it is in full sunlight. */
 void bst_mtt_note_light(bst_mtt_track *track);
 

@@ -21,6 +21,10 @@
 /* Share of max_coast_s without a detection after which a faint track becomes dormant. */
 #define FADED_SHARE 0.5
 #define FULL_LIGHT 0.99
+/* Mean times for which an object that the cue expects is bright and dark (flashes, turning away,
+ * fading), s: design choices. With 1 frame/s and a detection probability of 0.9 a track is rather
+ * dark than lost from the third miss on, and a track of one false alarm in 600 is given up. */
+static const double BRIGHT_S = 600.0, DARK_S = 60.0;
 
 /* Smallest distance of the segment between two geocentric points from the Earth's centre, m. */
 static double least_distance(bst_vec3 a, bst_vec3 b) {
@@ -82,6 +86,25 @@ static bool has_faded(const bst_mtt *m, const bst_mtt_track *track, double secon
            seconds - track->last_update_s > FADED_SHARE * m->params.max_coast_s;
 }
 
+/* Predicts the probability that the object of a track is dark: a Markov chain of two states. Only
+ * an object that the cue expects is waited for. */
+static void predict_darkness(bst_mtt_track *track, double dt_s, const bst_mtt_frame *frame) {
+    bool waits = track->status != BST_TRACK_TENTATIVE && !track->star && !track->asleep &&
+                 frame->expected && frame->expected(frame->user, track);
+    double turning = waits ? -expm1(-dt_s / BRIGHT_S) : 0.0;
+    double left = waits ? exp(-dt_s / DARK_S) : 0.0;
+    track->dark = track->dark * left + (1.0 - track->dark) * turning;
+}
+
+void bst_mtt_note_darkness(const bst_mtt *m, int t) {
+    bst_mtt_track *track = &m->tracks[t];
+    if (m->detection_of_track[t] >= 0) {
+        track->dark = 0.0;
+    } else if (track->may_miss) {
+        track->dark /= 1.0 - m->params.detection_probability * (1.0 - track->dark);
+    }
+}
+
 void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
     assert(m && frame && t >= 0 && t < m->track_count);
     bst_mtt_track *track = &m->tracks[t];
@@ -100,6 +123,7 @@ void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
             inflate_covariance(track);
         }
     }
+    predict_darkness(track, fmax(frame->seconds - m->seconds, 0.0), frame);
     m->sleepers += track->asleep;
     track->may_miss = m->observable[t] && track->sight == BST_MTT_CLEAR;
     m->observable[t] = m->observable[t] && !track->asleep;
