@@ -62,7 +62,7 @@ static void note_age(ages *a, const bst_world *world, int body, const char *name
     if (!bst_world_element_age(world, body, &offset_s)) {
         return;
     }
-    double days = fmax(fabs(offset_s), fabs(offset_s + duration_s)) / 86400.0;
+    double days = fmax(fabs(offset_s), fabs(offset_s + duration_s)) / BST_DAY_S;
     a->sets++;
     a->old += days > OLD_ELEMENTS_DAYS;
     if (days > a->most_days) {
