@@ -293,7 +293,8 @@ static uint64_t hash_command(uint64_t hash, const bst_los_command *c) {
 /* Copies what bst_control_aim and the search need of a controller: all but the histories of the
  * compensator, which are most of its bytes. */
 static void copy_aim(bst_control *to, const bst_control *from) {
-    const size_t before = offsetof(bst_control, image_loop), after = before + sizeof from->image_loop;
+    const size_t before = offsetof(bst_control, image_loop),
+                 after = before + sizeof from->image_loop;
     memcpy(to, from, before);
     memcpy((char *)to + after, (const char *)from + after, sizeof *to - after);
 }

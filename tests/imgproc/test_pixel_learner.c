@@ -311,9 +311,12 @@ static void room_is_bounded(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(moving_sky),      cmocka_unit_test(sky_at_rest),
-        cmocka_unit_test(no_defects),      cmocka_unit_test(windows_and_binning),
-        cmocka_unit_test(room_is_bounded), cmocka_unit_test(aside_and_back),
+        cmocka_unit_test(moving_sky),
+        cmocka_unit_test(sky_at_rest),
+        cmocka_unit_test(no_defects),
+        cmocka_unit_test(windows_and_binning),
+        cmocka_unit_test(room_is_bounded),
+        cmocka_unit_test(aside_and_back),
         cmocka_unit_test(full_targets_after_slews),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

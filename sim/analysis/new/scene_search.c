@@ -264,7 +264,8 @@ static bst_status choose_days(bst_ctx *ctx, search *s) {
         return bst_fail(ctx, BST_ERR_RANGE,
                         "the element sets of %s and %s are %.0f days apart: none of them is good "
                         "for longer than 14 days; take sets of nearer dates, or give --start",
-                        s->request->observer.name, s->request->target.name, fabs(apart) / BST_DAY_S);
+                        s->request->observer.name, s->request->target.name,
+                        fabs(apart) / BST_DAY_S);
     }
     /* a scenario's epoch in whole seconds */
     char text[48];
