@@ -85,7 +85,8 @@ bst_status bst_obsgen_pending_reserve(bst_ctx *ctx, bst_obsgen_pending *p, int c
     return BST_OK;
 }
 
-/* Saves or restores header and items of the truth, and of which ghosts these are. */
+/* Saves or restores header and items of the truth, and of which ghosts these are. A live edit may
+ * have shortened the camera's list since: no light comes from a ghost that is no longer there. */
 static bst_status archive_truth(bst_obsgen_pending *p, int ghosts, bst_archive *archive) {
     bst_ctx *ctx = bst_archive_ctx(archive);
     BST_TRY(bst_obsgen_pending_reserve(ctx, p, 0));
@@ -101,14 +102,20 @@ static bst_status archive_truth(bst_obsgen_pending *p, int ghosts, bst_archive *
     BST_TRY(bst_obsgen_pending_reserve(ctx, p, count));
     bst_archive_bytes(archive, p->truth->items, (size_t)count * sizeof *p->truth->items);
     bst_archive_bytes(archive, p->ghost, (size_t)count * sizeof *p->ghost);
+    int saved = ghosts;
+    BST_ARCHIVE(archive, saved);
     for (int i = 0; bst_archive_is_restoring(archive) && i < count; i++) {
-        if (p->ghost[i] < -1 || p->ghost[i] >= ghosts) {
+        if (p->ghost[i] < -1 || p->ghost[i] >= saved) {
             int found = p->ghost[i];
             p->truth->count = 0;
             return bst_fail(ctx, BST_ERR_FORMAT,
                             "the saved truth of exposure %lld is damaged: ghost %d of a camera "
                             "with %d",
-                            (long long)p->exposure_id, found, ghosts);
+                            (long long)p->exposure_id, found, saved);
+        }
+        if (p->ghost[i] >= ghosts) {
+            p->ghost[i] = -1;
+            p->truth->items[i].electrons = 0.0;
         }
     }
     return BST_OK;

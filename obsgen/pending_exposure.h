@@ -53,7 +53,7 @@ bst_generator_frame bst_obsgen_pending_frame(const bst_obsgen_pending *pending,
 
 /* Saves or restores a pending exposure, for bst_module_desc.archive.
  *
- * Given:     ghosts  number of ghosts of the camera
+ * Given:     ghosts  number of ghosts of the camera; those that were saved beyond it have no light
  * Errors:    BST_ERR_FORMAT for a damaged truth, ghost or path; BST_ERR_MEMORY */
 bst_status bst_obsgen_pending_archive(bst_obsgen_pending *pending, int ghosts,
                                       bst_archive *archive) BST_MUST_CHECK;

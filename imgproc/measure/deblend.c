@@ -130,6 +130,7 @@ bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *foun
     bst_imgproc_source *free_sources[BST_FIT_MAX_FREE];
     for (int k = 0; k < c.free_count; k++) {
         copies[k] = *c.free[k];
+        copies[k].shape.sigma_px = w->l->profiles.sigma_px;
         free_sources[k] = &copies[k];
     }
     bst_fit_data data = {f->signal, f->width, f->height, found->noise_e, f->excess};

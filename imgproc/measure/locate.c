@@ -23,7 +23,7 @@ enum {
  * blend */
 static const double MOVED_PX = 0.1;
 
-/* the PSF widening is measured on sources above this SNR */
+/* the width of the PSF is measured on sources above this SNR */
 static const double WIDTH_FIT_SNR = 20.0;
 /* Point and streak shape are both fitted if the streak's output is above this share of the point's,
  * or the squared point output is within these limits below the squared streak output. */
@@ -162,8 +162,7 @@ static void fit_shape_and_position(const bst_imgproc_worker *w, int i, bst_imgpr
         found->source.fitted = bst_blooming_fit(w, i, found);
         return;
     }
-    double widening = l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
-    found->source.widening_px2 = widening;
+    found->source.widening_px2 = bst_frame_width_mean(&l->width);
     bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
     if (is_shape_ambiguous(f, found)) {
         bst_imgproc_source point = initial_source(f, found, false),
@@ -184,20 +183,6 @@ static void fit_shape_and_position(const bst_imgproc_worker *w, int i, bst_imgpr
     }
     bst_imgproc_stamp stamp = bst_deblend_stamp(l, f, &found->source);
     found->source.fitted = bst_deblend_fit(w, i, found, &stamp, bright);
-}
-
-/* Adds a bright source's fitted width to the mean PSF widening of the frame. */
-static void add_widening(bst_imgproc_locator *l, const bst_locate_frame *f,
-                         const bst_imgproc_found *found) {
-    bool measured = found->source.fitted && found->source.widening_variance > 0.0 && !found->bleed;
-    double variance = f->sigma_px * f->sigma_px;
-    if (measured && fabs(found->source.widening_px2) < 0.5 * variance) {
-        /* the weight of a single source is limited to that of a 3 % measurement */
-        double floor = 0.03 * variance;
-        double weight = 1.0 / (found->source.widening_variance + floor * floor);
-        l->widening_sum += weight * found->source.widening_px2;
-        l->widening_weight += weight;
-    }
 }
 
 /* True if charge was masked near a candidate: the matched filter responds to such charge beside it
@@ -352,6 +337,24 @@ static void first_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *fou
     }
 }
 
+/* Adds the width of a bright source; charge that overflows makes no image of the PSF. */
+static void add_width(bst_imgproc_locator *l, const bst_imgproc_found *found) {
+    if (!found->bleed) {
+        bst_frame_width_add(&l->width, &l->profiles, &found->source);
+    }
+}
+
+/* Fits the brightest sources, up to `end`, until they say that the PSF is as wide as it is taken
+ * for. */
+static void fit_brightest(bst_imgproc_locator *l, const bst_locate_frame *f, int end) {
+    do {
+        process_group(l, f, 0, end, first_fit);
+        for (int i = 0; i < end; i++) {
+            add_width(l, &l->found[i]);
+        }
+    } while (bst_frame_width_adapt(&l->width, &l->profiles, &l->psf));
+}
+
 /* Locates a source at the filter's peak; one with charge is fitted, because the filter lacks its
  * masked pixels. */
 static void locate_at_peak(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
@@ -482,17 +485,17 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
         update_longest_path(l, &l->found[i].source.shape);
     }
     bst_deblend_index(l, f);
-    double variance = f->sigma_px * f->sigma_px;
-    l->widening_sum = 0.0;
-    l->widening_weight = 1.0 / (0.0025 * variance * variance); /* prior: no widening, 1 sigma 5 % */
     bst_locate_prepare(l, f);
     bst_blooming_join(l, f);
     bst_cosmic_ray_remove(l, f);
-    for (int first = 0, end; first < fits; first = end) {
+    const int brightest = FIRST_GROUP < fits ? FIRST_GROUP : fits;
+    bst_frame_width_clear(&l->width, &l->profiles);
+    fit_brightest(l, f, brightest);
+    for (int first = brightest, end; first < fits; first = end) {
         end = group_end(first) < fits ? group_end(first) : fits;
         process_group(l, f, first, end, first_fit);
         for (int i = first; i < end; i++) {
-            add_widening(l, f, &l->found[i]);
+            add_width(l, &l->found[i]);
         }
     }
     bst_deblend_drop_doubles(l, f, fits);

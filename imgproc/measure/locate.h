@@ -7,6 +7,7 @@
 #include "boresight/camera_motion.h"
 #include "imgproc/detect/candidates.h"
 #include "imgproc/measure/fit.h"
+#include "imgproc/measure/frame_width.h"
 #include "imgproc/measure/sharpness.h"
 
 /* Hot-pixel or cosmic-ray charge at a candidate, in frame pixels. */
@@ -69,9 +70,9 @@ typedef struct bst_imgproc_locator {
     int count;
     int *cell; /* spatial index: first source of each cell, by its maximum */
     int columns, rows;
-    double longest_px; /* half of the longest source path of this frame, along an axis */
-    double widening_sum, widening_weight;
-    int *charged; /* masked pixels of the latest frame that hold charge */
+    double longest_px;     /* half of the longest source path of this frame, along an axis */
+    bst_frame_width width; /* of the PSF in this frame, beside that of `profiles` */
+    int *charged;          /* masked pixels of the latest frame that hold charge */
     int charged_count, charged_capacity;
 } bst_imgproc_locator;
 

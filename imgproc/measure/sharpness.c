@@ -143,15 +143,18 @@ typedef struct neighbourhood {
     bool known[3][3];
 } neighbourhood;
 
+/* least: neighbours that are full count with their least charge */
 static neighbourhood read_neighbourhood(const bst_sharpness *sharpness, const float *signal,
-                                        int width, int height, int x, int y) {
+                                        int width, int height, int x, int y, bool least) {
     neighbourhood s = {.centre = bst_sharpness_signal(sharpness, signal[(long)y * width + x])};
     for (int j = 0; j < 3; j++) {
         for (int i = 0; i < 3; i++) {
             int u = x + i - 1, v = y + j - 1;
-            s.known[j][i] = u >= 0 && v >= 0 && u < width && v < height &&
-                            signal[(long)v * width + u] > BST_PIXEL_NONE;
-            s.at[j][i] = s.known[j][i] ? (double)signal[(long)v * width + u] : 0.0;
+            bool inside = u >= 0 && v >= 0 && u < width && v < height;
+            float here = inside ? signal[(long)v * width + u] : BST_PIXEL_NONE;
+            s.at[j][i] = least ? bst_sharpness_signal(sharpness, here) : (double)here;
+            s.known[j][i] = s.at[j][i] > (double)BST_PIXEL_NONE;
+            s.at[j][i] = s.known[j][i] ? s.at[j][i] : 0.0;
         }
     }
     return s;
@@ -194,7 +197,7 @@ double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, 
         !(bst_sharpness_signal(s, signal[(long)y * width + x]) > 3.0 * noise_e)) {
         return 0.0;
     }
-    neighbourhood p = read_neighbourhood(s, signal, width, height, x, y);
+    neighbourhood p = read_neighbourhood(s, signal, width, height, x, y, false);
     bool suspicious = false;
     /* the mean over all groups falls short only if one of the pairs does */
     for (int g = 1; g < BST_SHARP_GROUPS; g++) {
@@ -210,7 +213,8 @@ bst_sharpness_test bst_sharpness_compare(const bst_sharpness *s, const float *si
         !(bst_sharpness_signal(s, signal[(long)y * width + x]) > 3.0 * noise_e)) {
         return out;
     }
-    neighbourhood p = read_neighbourhood(s, signal, width, height, x, y);
+    bool full = signal[(long)y * width + x] == BST_PIXEL_SATURATED;
+    neighbourhood p = read_neighbourhood(s, signal, width, height, x, y, full);
     double alone = 0.0;
     for (int g = 0; g < BST_SHARP_GROUPS; g++) {
         if (!is_whole(&p, g)) {

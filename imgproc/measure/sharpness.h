@@ -72,7 +72,9 @@ typedef struct bst_sharpness_test {
     float all, all_alone;     /* of all eight neighbours; may be negative */
 } bst_sharpness_test;
 
-/* Compares a pixel with its neighbours; detailed result of bst_sharpness_at. */
+/* Compares a pixel with its neighbours; detailed result of bst_sharpness_at, with one difference:
+ * full neighbours of a full pixel count with full_e, the least charge of each. Only charge in a
+ * single pixel, or in one column of them (blooming), has less in some direction. */
 bst_sharpness_test bst_sharpness_compare(const bst_sharpness *sharpness, const float *signal,
                                          int width, int height, double noise_e, int x, int y);
 

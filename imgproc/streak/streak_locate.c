@@ -163,9 +163,8 @@ static void measure_streak(bst_streak_locator *l, const bst_locate_frame *f,
                                    .y_px = 0.5 * (line->y0 + line->y1),
                                    .dx_px = line->x1 - line->x0,
                                    .dy_px = line->y1 - line->y0,
-                                   .sigma_px = f->sigma_px};
-    s->widening_px2 =
-        found->widening_weight > 0.0 ? found->widening_sum / found->widening_weight : 0.0;
+                                   .sigma_px = found->profiles.sigma_px};
+    s->widening_px2 = bst_frame_width_mean(&found->width);
     out->noise_e = bst_background_noise_at(f->background, s->shape.x_px, s->shape.y_px);
     double length = hypot(s->shape.dx_px, s->shape.dy_px);
     /* norm of a streak that is long compared with the PSF: 1 / sqrt(2 sqrt(pi) sigma length) */

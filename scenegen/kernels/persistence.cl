@@ -56,7 +56,8 @@ READOUT_GROUP kernel void bst_detector_persistence(
         lanes mean[4] = {m.a, m.b, m.c, m.d};
         KEEP_LOOP
         for (int v = 0; v < 4; v++) {
-            const lanes_int lane = (lanes_int)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            const lanes_int lane =
+                (lanes_int)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
             /* beside the sensor the image holds anything */
             mean[v] = select((lanes)0.0f, mean[v], MASK(lane + x + 16 * v < p.sensor_width));
             global lanes *charge = (global lanes *)(held + at) + v; /* in a ramp */
@@ -71,7 +72,8 @@ READOUT_GROUP kernel void bst_detector_persistence(
             int some_full = any_of(full);
             for (int k = 0; k < t.kinds; k++) {
                 global lanes *n = (global lanes *)trapped + (at / 16 + v) * t.kinds + k;
-                lanes before = *n * t.gap[k], after = trapped_after(t, k, before, from, to, full, some_full);
+                lanes before = *n * t.gap[k];
+                lanes after = trapped_after(t, k, before, from, to, full, some_full);
                 mean[v] += before - after;
                 *n = after;
             }

@@ -186,8 +186,9 @@ READOUT_GROUP kernel void bst_detector_mark(bst_kernel_frame_params p, global co
     }
     for (int x = 0; x < p.light_stride; x += 16) {
         size_t at = (size_t)y * p.light_stride + x;
-        /* the sign of a difference: some compilers narrow comparisons to bytes lane by lane */
-        uint16 below = as_uint16(vload16(0, image + at) - p.full_well_e) >> 31;
+        /* the sign of a difference: some compilers narrow comparisons to bytes lane by lane; fmax:
+         * no number has any sign, and is not full */
+        uint16 below = as_uint16(fmax(vload16(0, image + at), 0.0f) - p.full_well_e) >> 31;
         vstore16(convert_uchar16(1u - below), 0, full + at);
     }
 }

@@ -6,7 +6,6 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-#define DAY_S 86400.0
 /* Start of UTC. ERFA checks the following day, and accepts the day before. */
 #define FIRST_YEAR 1960
 #define FIRST_JD 2436934.5
@@ -173,9 +172,9 @@ void bst_time_to_utc(bst_time t, int digits, char *buffer, size_t bytes) {
 }
 
 bst_time bst_time_add(bst_time t, double seconds) {
-    double rest = fmod(seconds, DAY_S); /* exact */
-    double days = (seconds - rest) / DAY_S;
-    return normalised(t.jd1 + round(days), t.jd2 + rest / DAY_S);
+    double rest = fmod(seconds, BST_DAY_S); /* exact */
+    double days = (seconds - rest) / BST_DAY_S;
+    return normalised(t.jd1 + round(days), t.jd2 + rest / BST_DAY_S);
 }
 
 bst_time bst_time_at_tick(bst_time epoch, int64_t tick, int64_t ticks_per_second) {
@@ -186,11 +185,11 @@ bst_time bst_time_at_tick(bst_time epoch, int64_t tick, int64_t ticks_per_second
 }
 
 double bst_time_diff(bst_time a, bst_time b) {
-    return ((a.jd1 - b.jd1) + (a.jd2 - b.jd2)) * DAY_S;
+    return ((a.jd1 - b.jd1) + (a.jd2 - b.jd2)) * BST_DAY_S;
 }
 
 void bst_time_tt(bst_time t, double *jd1, double *jd2) {
-    bst_time tt = normalised(t.jd1, t.jd2 + ERFA_TTMTAI / DAY_S);
+    bst_time tt = normalised(t.jd1, t.jd2 + ERFA_TTMTAI / BST_DAY_S);
     *jd1 = tt.jd1;
     *jd2 = tt.jd2;
 }

@@ -6,6 +6,8 @@
 
 #include "boresight/status.h"
 
+#define BST_DAY_S 86400.0 /* of a Julian date */
+
 /* A time as two-part Julian date in TAI. jd1: Julian date of a midnight (x.5); jd2 in [0, 1):
  * fraction of the day; resolution better than 1e-10 s. */
 typedef struct bst_time {

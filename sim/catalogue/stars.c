@@ -10,6 +10,8 @@
 #include <unistd.h>
 
 #include "boresight/rng.h"
+#include "sim/astro/bodies.h"
+#include "sim/astro/time.h"
 #include "sim/catalogue/bright_stars.h"
 #include "sim/catalogue/cell_index.h"
 #include "sim/catalogue/star_index.h"
@@ -269,8 +271,6 @@ static radec_box box_around(bst_vec3 centre, double radius_rad) {
     return box;
 }
 
-static const double LIGHT_SPEED_MPS = 299792458.0, DAY_S = 86400.0;
-
 /* largest difference of Tycho-2's V and the published one, mag */
 #define MOST_WRONG_MAG 0.5
 
@@ -292,8 +292,8 @@ static bool unpack(const bst_star_view *view, const bst_star_record *r, uint32_t
                                      : NULL;
     if (v) {
         /* at the barycentre the light has the phase that is seen by the observer */
-        double ahead_s = bst_vec3_dot(observer->barycentre_m, direction) / LIGHT_SPEED_MPS;
-        double mag = bst_star_variable_mag(view, v, observer->jd + ahead_s / DAY_S);
+        double ahead_s = bst_vec3_dot(observer->barycentre_m, direction) / BST_LIGHT_SPEED_MPS;
+        double mag = bst_star_variable_mag(view, v, observer->jd + ahead_s / BST_DAY_S);
         out->v_mag += (float)(published ? mag - (double)v->table_mag : mag);
     }
     return published || v;
@@ -446,7 +446,7 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
 
 double bst_stars_year_after(const bst_stars *stars, double julian_year, double seconds) {
     const bool in_time = stars->view.has_parallax || stars->view.variable_count > 0;
-    return in_time ? julian_year + seconds / (DAY_S * 365.25) : julian_year;
+    return in_time ? julian_year + seconds / (BST_DAY_S * 365.25) : julian_year;
 }
 
 /* Record of a star; NULL: not in the catalogue. */

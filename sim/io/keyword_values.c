@@ -141,9 +141,9 @@ static bst_status read_time(const bst_keyword_reading *r, double exposure_s, bst
         snprintf(what, sizeof what, "is no number (found \"%.60s\")", text);
         return bst_keyword_wrong(r, t->keyword, "time", what);
     } else if (t->format == BST_KEYWORD_UNIX) { /* day and second apart, for their digits */
-        double days = floor(date / 86400.0);
-        status = bst_time_from_utc_jd(&unheard, 2440587.5 + days, (date - 86400.0 * days) / 86400.0,
-                                      out);
+        double days = floor(date / BST_DAY_S);
+        status = bst_time_from_utc_jd(&unheard, 2440587.5 + days,
+                                      (date - BST_DAY_S * days) / BST_DAY_S, out);
     } else {
         double whole = floor(date);
         status = bst_time_from_utc_jd(

@@ -287,7 +287,7 @@ static bool may_be(const bst_run_custody *c, int object, const bst_custody_obser
     double along = bst_vec3_dot(line, z->direction);
     double across2 = bst_vec3_dot(line, line) - along * along;
     const bst_custody_filter *f = &c->filters[object];
-    double days = z->observer.time_s / 86400.0, variance = 0.0;
+    double days = z->observer.time_s / BST_DAY_S, variance = 0.0;
     for (int k = BST_CUSTODY_ECC_X; k < BST_CUSTODY_ALONG; k++) {
         variance += f->p[k][k];
     }

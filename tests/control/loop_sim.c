@@ -290,11 +290,13 @@ static uint64_t hash_command(uint64_t hash, const bst_los_command *c) {
     return hash;
 }
 
-/* Copies what bst_control_aim and the search need of a controller: most of its bytes are histories
- * of the compensators. */
+/* Copies what bst_control_aim and the search need of a controller: all but the histories of the
+ * compensator, which are most of its bytes. */
 static void copy_aim(bst_control *to, const bst_control *from) {
-    memcpy(to, from, offsetof(bst_control, image_loop));
-    memcpy(&to->mode, &from->mode, sizeof *to - offsetof(bst_control, mode));
+    const size_t before = offsetof(bst_control, image_loop),
+                 after = before + sizeof from->image_loop;
+    memcpy(to, from, before);
+    memcpy((char *)to + after, (const char *)from + after, sizeof *to - after);
 }
 
 enum { WAY = 256, PENDING = 8 };     /* commands and messages on their way */

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """`boresight new`: scenarios for random pairs of the shipped element sets, whose loop holds.
 
-Usage, from the repository root: /usr/bin/python3 tests/e2e/test_new.py BORESIGHT [PAIRS]
-With PAIRS so many pairs with the runs as they are written, else a few short ones.
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_new.py BORESIGHT [PAIRS [FIRST]]
+With PAIRS so many pairs with the runs as they are written, else a few short ones. Each pair is reported when it
+is done, by its place in the draw; FIRST goes on from there.
 """
 import json
 import os
@@ -14,6 +15,7 @@ import unittest
 from concurrent.futures import ThreadPoolExecutor
 
 PAIRS = int(sys.argv.pop(2)) if len(sys.argv) > 2 and sys.argv[2].isdigit() else 0
+FIRST = int(sys.argv.pop(2)) if PAIRS and len(sys.argv) > 2 and sys.argv[2].isdigit() else 0
 
 import runs  # noqa: E402
 
@@ -55,27 +57,32 @@ def follow(folder, index, pair, *options):
     return ("held" if held else "failed"), text
 
 
-def sample(count, *options):
-    """The first `count` random pairs that see each other, and the others met on the way."""
+def sample(count, first, *options):
+    """From the pair `first` of the draw: `count` pairs that see each other, and the others met on the way."""
     draw, folder, pool = random.Random(SEED), runs.scratch(), numbers()
+    for _ in range(first):
+        draw.sample(pool, 2)
     results = []
+
+    def followed(index, pair):
+        kind, words = follow(folder, index, pair, *options)
+        shutil.rmtree(os.path.join(folder, str(index)), ignore_errors=True)
+        print(index, kind, *pair, words, flush=True)
+        return kind
+
     with ThreadPoolExecutor(2) as workers:
-        while sum(kind != "unseen" for _, (kind, _) in results) < count:
-            missing = count - sum(kind != "unseen" for _, (kind, _) in results)
-            pairs = [draw.sample(pool, 2) for _ in range(missing)]
-            jobs = [workers.submit(follow, folder, len(results) + i, pair, *options)
-                    for i, pair in enumerate(pairs)]
-            results += [(pair, job.result()) for pair, job in zip(pairs, jobs)]
+        while sum(kind != "unseen" for kind in results) < count:
+            missing = count - sum(kind != "unseen" for kind in results)
+            jobs = [workers.submit(followed, first + len(results) + i, draw.sample(pool, 2)) for i in range(missing)]
+            results += [job.result() for job in jobs]
     return results
 
 
 class New(unittest.TestCase):
     def test_random_pairs(self):
-        results = sample(PAIRS) if PAIRS else sample(2, "--duration", "30")
-        counts = {kind: sum(k == kind for _, (k, _) in results) for kind in ("held", "failed", "unseen")}
+        results = sample(PAIRS, FIRST) if PAIRS else sample(2, 0, "--duration", "30")
+        counts = {kind: results.count(kind) for kind in ("held", "failed", "unseen")}
         print(f"seed {SEED}: {counts}")
-        for pair, (kind, words) in results:
-            print(kind, *pair, words)
         self.assertEqual(counts["failed"], 0)
         # most pairs of low satellites see each other within two days
         self.assertGreater(counts["held"], counts["unseen"])

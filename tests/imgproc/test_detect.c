@@ -121,29 +121,38 @@ static void extents_and_magnitude(void **state) {
     end(&f);
 }
 
-/* A PSF that jitter widened from 0.849 to 0.90 px: fluxes must not follow the mismatch. */
+/* A PSF that jitter widened from 0.849 px a little and by a third: fluxes must not follow the
+ * mismatch, and places have their covariance. */
 static void widened_psf_keeps_fluxes(void **state) {
     (void)state;
-    fixture f = begin(256, 256);
-    bst_camera onboard = f.s.camera;
-    f.s.camera.psf_fwhm_px = 2.3548200450309493 * 0.90;
-    double bright = 5000, faint = 600;
-    for (int i = 0; i < 36; i++) {
-        synthetic_add(&f.s, 30 + i % 6 * 38 + 0.1 * i, 30 + i / 6 * 38 + 0.07 * i,
-                      i < 12 ? bright : faint, 0, 0);
+    static const double widths_px[] = {0.90, 1.13};
+    for (int k = 0; k < 2; k++) {
+        fixture f = begin(256, 256);
+        bst_camera onboard = f.s.camera;
+        f.s.camera.psf_fwhm_px = 2.3548200450309493 * widths_px[k];
+        double bright = 5000, faint = 600;
+        for (int i = 0; i < 36; i++) {
+            synthetic_add(&f.s, 30 + i % 6 * 38 + 0.1 * i, 30 + i / 6 * 38 + 0.07 * i,
+                          i < 12 ? bright : faint, 0, 0);
+        }
+        f.s.camera = onboard;
+        expose(&f, NULL);
+        double sum[2] = {0}, square = 0.0;
+        for (int i = 0; i < 36; i++) {
+            double x = 30 + i % 6 * 38 + 0.1 * i, y = 30 + i / 6 * 38 + 0.07 * i;
+            const bst_detection *d = near_to(&f, x, y, 1);
+            sum[i >= 12] += d->flux_e;
+            square += (d->x_px - x) * (d->x_px - x) / d->cov_xx +
+                      (d->y_px - y) * (d->y_px - y) / d->cov_yy;
+        }
+        /* means of 12 and 24 sources of 2 % and 6 %: three standard errors; a fixed width gives
+         * -6 and -24 %, a width to first order 0 and -5 % */
+        bst_assert_close(sum[0] / 12 / bright, 1.0, 0.02);
+        bst_assert_close(sum[1] / 24 / faint, 1.0, 0.035);
+        /* 72 values: four standard deviations of the mean square */
+        bst_assert_close(square / 72, 1.0, 4.0 * sqrt(2.0 / 72));
+        end(&f);
     }
-    f.s.camera = onboard;
-    expose(&f, NULL);
-    double sum[2] = {0};
-    for (int i = 0; i < 36; i++) {
-        const bst_detection *d =
-            near_to(&f, 30 + i % 6 * 38 + 0.1 * i, 30 + i / 6 * 38 + 0.07 * i, 1);
-        sum[i >= 12] += d->flux_e;
-    }
-    /* means of 12 and 24 sources of 2 % and 6 %: three standard errors; a fixed width gives -6 % */
-    bst_assert_close(sum[0] / 12 / bright, 1.0, 0.02);
-    bst_assert_close(sum[1] / 24 / faint, 1.0, 0.035);
-    end(&f);
 }
 
 /* Stars under an accelerated motion: the mean place is found, not that of the even streak. */

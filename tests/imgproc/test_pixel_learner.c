@@ -209,6 +209,34 @@ static void aside_and_back(void **state) {
     end(&s);
 }
 
+/* Targets that fill several pixels, another one after each slew, all at the same place in the
+ * frame, because the boresight follows them: their pixels are never suspected. Full pixels in one
+ * column, as charge of a defect that blooms, are learned. */
+static void full_targets_after_slews(void **state) {
+    (void)state;
+    scene s;
+    begin(&s, 9);
+    s.target_e = 4e6;
+    const int column = 40 * SIDE + 200;
+    double most = 0.0;
+    for (int i = 0; i < 40; i++) {
+        s.moved_px += i % 8 == 7 ? 50.0 + 3.0 * i : 0.0;
+        for (int k = 0; k < 3; k++) {
+            s.hot[k] = column + (k - 1) * SIDE;
+            s.hot_e[k] = 1e6;
+        }
+        expose(&s, whole, 1);
+        for (int k = 0; k < 81; k++) {
+            int pixel = ((int)TARGET_Y + k / 9 - 4) * SIDE + (int)TARGET_X + k % 9 - 4;
+            most = fmax(most, bst_pixel_learner_suspicion(
+                                  s.learner, bst_pixel_learner_map(s.learner, 0), pixel));
+        }
+    }
+    assert_true(most < 1.0);
+    assert_true(is_bad(&s, column - SIDE) || is_bad(&s, column) || is_bad(&s, column + SIDE));
+    end(&s);
+}
+
 /* Without defects, 120 frames of stars, hits and noise: each pixel under suspicion is taken for bad
  * with a chance of 1e-5 at most, and fewer than 20 of them are new in a frame: 0.03 expected. */
 static void no_defects(void **state) {
@@ -283,9 +311,13 @@ static void room_is_bounded(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(moving_sky),      cmocka_unit_test(sky_at_rest),
-        cmocka_unit_test(no_defects),      cmocka_unit_test(windows_and_binning),
-        cmocka_unit_test(room_is_bounded), cmocka_unit_test(aside_and_back),
+        cmocka_unit_test(moving_sky),
+        cmocka_unit_test(sky_at_rest),
+        cmocka_unit_test(no_defects),
+        cmocka_unit_test(windows_and_binning),
+        cmocka_unit_test(room_is_bounded),
+        cmocka_unit_test(aside_and_back),
+        cmocka_unit_test(full_targets_after_slews),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

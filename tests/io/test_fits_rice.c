@@ -48,8 +48,9 @@ static void test_tiles(void **state) {
         const int count = 1 + (int)(draw() % (t % 10 == 0 ? TILE_MOST : 140));
         const uint16_t base = (uint16_t)draw();
         const int bits = t % 17;
+        const tile_kind kind = (tile_kind)((t + t / 10) % TILE_KINDS); /* long tiles of each kind */
         for (int i = 0; i < count; i++) {
-            pixels[i] = make_pixel((tile_kind)(t % TILE_KINDS), base, bits);
+            pixels[i] = make_pixel(kind, base, bits);
             stored[i] = (short)(pixels[i] ^ 0x8000);
         }
         const int expected = fits_rcomp_short(stored, count, theirs, BYTES, BST_FITS_RICE_BLOCK);
@@ -76,14 +77,17 @@ static void test_by_hand(void **state) {
     assert_memory_equal(out, expected, sizeof expected);
 }
 
-/* Table and heap of an image extension: from its header's end to its own. */
-static char *read_data(const char *path, size_t *bytes) {
+/* Table and heap of a compressed image: from its header's end to its own.
+ *
+ * Returned:  largest  format of the table's column, with the bytes of the largest tile */
+static char *read_data(const char *path, size_t *bytes, char largest[FLEN_VALUE]) {
     fitsfile *file = NULL;
     int code = 0;
     LONGLONG head, data, end;
     fits_open_file(&file, path, READONLY, &code);
     fits_movabs_hdu(file, 2, NULL, &code);
     fits_get_hduaddrll(file, &head, &data, &end, &code);
+    fits_read_key(file, TSTRING, "TFORM1", largest, NULL, &code);
     fits_close_file(file, &code);
     assert_int_equal(code, 0);
     *bytes = (size_t)(end - data);
@@ -95,7 +99,7 @@ static char *read_data(const char *path, size_t *bytes) {
     return found;
 }
 
-/* A frame's tiles, their descriptors and the largest of them are those of cfitsio. */
+/* A frame's tiles, their descriptors and the bytes of its largest tile are those of cfitsio. */
 static void test_file(void **state) {
     (void)state;
     static const int sizes[][2] = {{61, 37}, {1, 1}, {1, 9}, {300, 2}, {32, 64}};
@@ -137,7 +141,10 @@ static void test_file(void **state) {
         assert_int_equal(code, 0);
 
         size_t bytes, expected;
-        char *found = read_data(ours, &bytes), *wanted = read_data(theirs, &expected);
+        char largest[FLEN_VALUE], largest_expected[FLEN_VALUE];
+        char *found = read_data(ours, &bytes, largest);
+        char *wanted = read_data(theirs, &expected, largest_expected);
+        assert_string_equal(largest, largest_expected);
         assert_int_equal(bytes, expected);
         assert_memory_equal(found, wanted, bytes);
         free(found);

@@ -59,6 +59,30 @@ static void comes_back(void **state) {
     }
 }
 
+/* A camera of one ghost, as after an edit of a live run. */
+static bst_status archive_with_one_ghost(void *pending, bst_archive *archive) {
+    return bst_obsgen_pending_archive(pending, 1, archive);
+}
+
+/* Ghosts that the camera no longer has give no light; all else comes back. */
+static void ghosts_that_are_gone(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_obsgen_pending p = make(&ctx, false), q = {.exposure_id = -1};
+    test_saved saved = test_save(archive_pending, &p);
+    bst_assert_ok(&ctx, test_restore(&ctx, archive_with_one_ghost, &q, saved));
+    assert_int_equal(q.truth->count, SOURCES);
+    for (int i = 0; i < SOURCES; i++) {
+        const bool gone = p.ghost[i] > 0;
+        assert_int_equal(q.ghost[i], gone ? -1 : p.ghost[i]);
+        assert_true(q.truth->items[i].electrons == (gone ? 0.0 : p.truth->items[i].electrons));
+    }
+    assert_int_equal(q.path_count, STEPS);
+    free(saved.bytes);
+    bst_obsgen_pending_free(&p);
+    bst_obsgen_pending_free(&q);
+}
+
 /* None is waiting: nothing else is saved, and what another exposure left does not matter. */
 static void none(void **state) {
     (void)state;
@@ -95,6 +119,7 @@ static void damage_is_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(comes_back),
+        cmocka_unit_test(ghosts_that_are_gone),
         cmocka_unit_test(none),
         cmocka_unit_test(damage_is_refused),
     };

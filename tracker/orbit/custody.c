@@ -17,7 +17,6 @@ enum {
     MOST_ITERATIONS = 5,
     MOST_REJECTED = 4 /* of the directions of an arc one in so many may be outliers */
 };
-#define DAY_S 86400.0
 /* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
  * Moon: 0.02 degrees), and differences are those of osculating elements. */
 #define LEAST_INCLINATION_RAD (0.2 * BST_DEG_RAD)
@@ -47,7 +46,7 @@ static bool elements_at(const bst_custody_orbit *o, const double x[N], bst_eleme
     const bst_elements *e = &o->elements;
     const double perigee = e->raan_rad + e->arg_perigee_rad, t = tan(0.5 * e->inclination_rad);
     const double plane_m = 2.0 * o->a_m / (1.0 + t * t);
-    const double dn = x[BST_CUSTODY_DRIFT] / (o->a_m * DAY_S); /* rad/s */
+    const double dn = x[BST_CUSTODY_DRIFT] / (o->a_m * BST_DAY_S); /* rad/s */
     const double y[N] = {
         e->mean_motion_radpmin + 60.0 * dn,
         e->eccentricity * cos(perigee) + x[BST_CUSTODY_ECC_X] / (2.0 * o->a_m),

@@ -7,14 +7,13 @@
 #include "tracker/orbit/custody.h"
 
 enum { N = BST_CUSTODY_STATE };
-#define DAY_S 86400.0
 
 void bst_custody_filter_init(const bst_custody_config *config, const bst_custody_orbit *orbit,
                              const double normals[N], bst_custody_filter *out) {
     assert(config && orbit && out && config->sigma_m > 0.0 && config->drift_m_per_day > 0.0);
     *out = (bst_custody_filter){.noise_until_s = 0.0};
     /* the error along the orbit has grown since the epoch of the elements by that of the drift */
-    const double age = orbit->epoch_offset_s / DAY_S;
+    const double age = orbit->epoch_offset_s / BST_DAY_S;
     const double s = config->sigma_m, drift = config->drift_m_per_day;
     for (int i = 0; i < N; i++) {
         out->p[i][i] = i == BST_CUSTODY_DRIFT ? drift * drift : s * s;
@@ -35,7 +34,7 @@ void bst_custody_add_process_noise(const bst_custody_config *config, double time
      * the state's DRIFT + dD and ALONG - u dD. The sums over u of a random walk with variance
      * `rate` per day are integrals of 1, -u and u^2. */
     const double rate = config->noise_m_per_day * config->noise_m_per_day;
-    const double from = filter->noise_until_s / DAY_S, to = time_s / DAY_S;
+    const double from = filter->noise_until_s / BST_DAY_S, to = time_s / BST_DAY_S;
     const double cross = -rate * (to * to - from * from) / 2.0;
     double(*p)[N] = filter->p;
     p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT] += rate * (to - from);

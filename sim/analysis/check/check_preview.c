@@ -7,12 +7,12 @@
 #include <cjson/cJSON.h>
 
 #include "boresight/vec.h"
+#include "sim/astro/time.h"
 #include "sim/core/json_member.h"
 #include "sim/core/json_number.h"
 #include "sim/world/world.h"
 #include "sim/world/world_config.h"
 
-static const double DAY_S = 86400.0;
 /* Steps by which the limit is lowered until few enough stars are left, mag. */
 static const double LIMIT_STEP_MAG = 0.25;
 /* Most steps: 50 mag down from any camera's limit there is no star. */
@@ -85,7 +85,7 @@ static bst_status add_sky(bst_ctx *ctx, const bst_world *world, bst_vec3 centre,
 /* Adds the target over the day. */
 static void add_day(bst_world_view *view, int observer, int object, cJSON *sensor) {
     cJSON *day = cJSON_AddObjectToObject(sensor, "day");
-    cJSON_AddNumberToObject(day, "step_s", DAY_S / BST_CHECK_PREVIEW_STEPS);
+    cJSON_AddNumberToObject(day, "step_s", BST_DAY_S / BST_CHECK_PREVIEW_STEPS);
     cJSON *v_mag = cJSON_AddArrayToObject(day, "v_mag");
     cJSON *sunlit = cJSON_AddArrayToObject(day, "sunlit_fraction");
     cJSON *occulted = cJSON_AddArrayToObject(day, "occulted");
@@ -93,7 +93,7 @@ static void add_day(bst_world_view *view, int observer, int object, cJSON *senso
         bst_ctx ignored = {0}; /* a body may have no orbit so long after the run */
         bst_world_sight sight;
         if (bst_world_view_sight(&ignored, view, observer, object,
-                                 DAY_S * i / BST_CHECK_PREVIEW_STEPS, &sight) != BST_OK) {
+                                 BST_DAY_S * i / BST_CHECK_PREVIEW_STEPS, &sight) != BST_OK) {
             return;
         }
         cJSON_AddItemToArray(

@@ -5,7 +5,7 @@
 #include "sim/engine/simulation.h"
 
 /* longest examined duration, s: predicting a day takes 0.2 s */
-#define BST_CHECK_LOOKED_S (3.0 * 86400.0)
+#define BST_CHECK_LOOKED_S (3.0 * BST_DAY_S)
 
 /* Logs a warning for each reason for which a sensor that follows a cue cannot point at it: Earth
  * occultation, keep-out cones, mount travel, mount limits, keyhole at the pole; and for impossible

@@ -2,7 +2,7 @@
 
 #include <stdio.h>
 
-#define DAY_S 86400.0
+#include "sim/astro/time.h"
 
 void bst_check_spans_add(bst_check_spans *spans, double from_s, double until_s) {
     if (spans->count++ == 0) {
@@ -30,7 +30,7 @@ bst_check_span_words bst_check_spans_word(const bst_check_spans *spans, double e
     }
     if (cut) {
         snprintf(words.more + length, sizeof words.more - (size_t)length, " in the first %.3g days",
-                 examined_s / DAY_S);
+                 examined_s / BST_DAY_S);
     }
     return words;
 }

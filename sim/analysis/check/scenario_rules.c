@@ -62,7 +62,7 @@ static void note_age(ages *a, const bst_world *world, int body, const char *name
     if (!bst_world_element_age(world, body, &offset_s)) {
         return;
     }
-    double days = fmax(fabs(offset_s), fabs(offset_s + duration_s)) / 86400.0;
+    double days = fmax(fabs(offset_s), fabs(offset_s + duration_s)) / BST_DAY_S;
     a->sets++;
     a->old += days > OLD_ELEMENTS_DAYS;
     if (days > a->most_days) {
@@ -328,7 +328,7 @@ static const rule rules[] = {
     {"short_times", "times of tracker and control that are over before the frames they wait for",
      NULL, short_times, NULL},
     {"loops", "loops that are unstable or have thin margins", NULL, NULL, loops},
-    {"burns", "burns that turn a target's line of sight faster than its tracker follows", NULL,
+    {"burn_rates", "burns that turn a target's line of sight faster than its tracker follows", NULL,
      NULL, bst_check_burns},
     {"reach",
      "times at which the cue is out of reach: Earth, keep-out cones, travel, limits, "

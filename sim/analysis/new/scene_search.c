@@ -12,9 +12,9 @@
 
 /* The search looks at one instant every LOOK_S for two days. Element sets may be AGE_S old at its
  * end: `boresight check` warns of sets older than two weeks. */
-#define SEARCH_S (2.0 * 86400.0)
+#define SEARCH_S (2.0 * BST_DAY_S)
 #define LOOK_S 20.0
-#define AGE_S (13.9 * 86400.0)
+#define AGE_S (13.9 * BST_DAY_S)
 #define DURATION_S 120.0
 #define LEAST_FRAMES 60.0
 /* Least angles between boresight and bodies: stray light of bright bodies is not simulated. */
@@ -264,7 +264,8 @@ static bst_status choose_days(bst_ctx *ctx, search *s) {
         return bst_fail(ctx, BST_ERR_RANGE,
                         "the element sets of %s and %s are %.0f days apart: none of them is good "
                         "for longer than 14 days; take sets of nearer dates, or give --start",
-                        s->request->observer.name, s->request->target.name, fabs(apart) / 86400.0);
+                        s->request->observer.name, s->request->target.name,
+                        fabs(apart) / BST_DAY_S);
     }
     /* a scenario's epoch in whole seconds */
     char text[48];
@@ -295,7 +296,7 @@ static bst_status nothing(bst_ctx *ctx, const search *s, const char *judged) {
                         "%s sees %s in the %.3g days from %s, but at none of the best times would "
                         "the loop hold: %s; choose another --start, --duration or target",
                         s->request->observer.name, s->request->target.name,
-                        s->count * LOOK_S / 86400.0, utc, judged);
+                        s->count * LOOK_S / BST_DAY_S, utc, judged);
     }
     if (isfinite(s->best_v_mag)) {
         double needed = s->request->aperture_m;
@@ -311,7 +312,7 @@ static bst_status nothing(bst_ctx *ctx, const search *s, const char *judged) {
             "%s is too faint for an aperture of %.3g m: V %.1f at best in the %.3g days "
             "from %s; an --aperture of %.2g would do",
             s->request->target.name, s->request->aperture_m, s->best_v_mag,
-            s->count * LOOK_S / 86400.0, utc, needed);
+            s->count * LOOK_S / BST_DAY_S, utc, needed);
     }
     if (s->few_stars > 0) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND,
@@ -325,12 +326,12 @@ static bst_status nothing(bst_ctx *ctx, const search *s, const char *judged) {
             ctx, BST_ERR_NOT_FOUND,
             "in the %.3g days from %s %s sees %s only with the Earth in the field; choose "
             "a smaller --pixel-scale, a shorter --duration or another target",
-            s->count * LOOK_S / 86400.0, utc, s->request->observer.name, s->request->target.name);
+            s->count * LOOK_S / BST_DAY_S, utc, s->request->observer.name, s->request->target.name);
     }
     return bst_fail(ctx, BST_ERR_NOT_FOUND,
                     "in the %.3g days from %s %s never sees %s for a whole run: it is %s of the "
                     "time; choose a shorter --duration, another --start or another target",
-                    s->count * LOOK_S / 86400.0, utc, s->request->observer.name,
+                    s->count * LOOK_S / BST_DAY_S, utc, s->request->observer.name,
                     s->request->target.name, *list ? list : "in view too short a part");
 }
 

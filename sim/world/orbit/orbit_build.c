@@ -17,7 +17,7 @@ bst_status bst_world_orbit_build_sgp4(const bst_world_builder *b, const bst_elem
     /* SGP4 counts uniform days of UTC: leap seconds since the element epoch do not count */
     double jd1, jd2, seconds = bst_time_diff(b->world->epoch, epoch);
     bst_time_utc(b->world->epoch, &jd1, &jd2);
-    double uniform = (jd1 - set->epoch_utc_jd1 + (jd2 - set->epoch_utc_jd2)) * 86400.0;
+    double uniform = (jd1 - set->epoch_utc_jd1 + (jd2 - set->epoch_utc_jd2)) * BST_DAY_S;
     orbit->epoch_offset_s = seconds - round(seconds - uniform);
     orbit->bstar = set->bstar;
     orbit->elements = *set;
