@@ -324,7 +324,8 @@ static void assign_task(bst_tasking *t, int sensor, int64_t tick, bst_task_end b
     const bst_tasking_config *c = &t->config;
     bst_tasking_sensor *s = &t->sensors[sensor];
     double now_s = seconds_of(t, tick);
-    s->task = (bst_task){.id = s->task.id + 1, .tick = tick, .object = -1, .before = (int32_t)before};
+    s->task =
+        (bst_task){.id = s->task.id + 1, .tick = tick, .object = -1, .before = (int32_t)before};
     s->given_s = s->arrival_s = now_s;
     s->frames = 0;
     if (choice) {

@@ -169,7 +169,8 @@ static void send_all(bst_ctx *ctx, bst_recorder *recorder) {
     t->tick = 1500;
     t->target_id = 9;
     t->count = 1;
-    t->attitude = (bst_attitude_fix){.valid = true, .stars = 12, .error_cam_rad = {.x = BST_ARCSEC_RAD}};
+    t->attitude =
+        (bst_attitude_fix){.valid = true, .stars = 12, .error_cam_rad = {.x = BST_ARCSEC_RAD}};
     double ra = 2.0, dec = 0.4;
     t->items[0] = (bst_track){
         .id = 9,

@@ -546,7 +546,8 @@ static void edges_and_outputs_fit_the_frame(void **state) {
     d = (bst_detector_config){.row_time_s = 1e-4, .parallel_traps = {{1.0}, {1.0}, 0.5, 0.0}};
     assert_int_equal(bst_detector_config_check(&f->ctx, &d), BST_ERR_CONFIG);
     assert_non_null(strstr(f->ctx.message, "traps"));
-    d = (bst_detector_config){.serial_traps = {{1.0}, {1.0}, 0.5, 0.0}, .crosstalk = {2, 0.0, true}};
+    d = (bst_detector_config){.serial_traps = {{1.0}, {1.0}, 0.5, 0.0},
+                              .crosstalk = {2, 0.0, true}};
     assert_int_equal(bst_detector_config_check(&f->ctx, &d), BST_ERR_CONFIG);
     assert_non_null(strstr(f->ctx.message, "serial_traps"));
     d.crosstalk.outputs = 1;

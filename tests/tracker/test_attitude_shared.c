@@ -53,13 +53,12 @@ static void measure(int count, double share, int turnover, int frames, double *e
             double c = cos(turn.z), d = sin(turn.z), *b = s.stays_px[n];
             double dx = own * bst_rng_normal(key, 2, draw++);
             double dy = own * bst_rng_normal(key, 2, draw++);
-            stars[i] = (bst_attitude_star){
-                .id = (uint32_t)(n + 1),
-                .apparent_gcrf = s.place[n],
-                .x_px = x + c * b[0] - d * b[1] + dx,
-                .y_px = y + d * b[0] + c * b[1] + dy,
-                .cov_xx = sigma * sigma,
-                .cov_yy = sigma * sigma};
+            stars[i] = (bst_attitude_star){.id = (uint32_t)(n + 1),
+                                           .apparent_gcrf = s.place[n],
+                                           .x_px = x + c * b[0] - d * b[1] + dx,
+                                           .y_px = y + d * b[0] + c * b[1] + dy,
+                                           .cov_xx = sigma * sigma,
+                                           .cov_yy = sigma * sigma};
         }
         bst_attitude_solution out;
         bst_attitude_solve(&camera, &params, q, stars, count, &out);
