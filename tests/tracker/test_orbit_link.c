@@ -3,16 +3,13 @@
 #include "tests/tracker/orbit_scene.h"
 #include "tracker/orbit/orbit_link.h"
 
-enum { BODIES = 5, DIRECTIONS = 10 };
+enum { BODIES = 3, DIRECTIONS = 10 };
 #define DAY_S 86400.0
 
-/* Two GEO objects 1 degree apart, an inclined one, one on a semi-synchronous orbit and a low one.
- */
+/* Two GEO objects 1 degree apart, and a low one. */
 static bst_od_state body(int k) {
     static const double elements[BODIES][6] = {{4.2164e7, 0.0003, 0.05, 20, 30, 100},
                                                {4.2164e7, 0.0002, 0.04, 60, 30, 61},
-                                               {4.2164e7, 0.001, 5, 60, 10, 20},
-                                               {2.656e7, 0.005, 55, 100, 20, 10},
                                                {7.5e6, 0.001, 70, 200, 20, 30}};
     const double *e = elements[k];
     return from_elements(e[0], e[1], e[2], e[3], e[4], e[5]);
@@ -40,7 +37,7 @@ static void arcs_of_an_object_are_linked(void **state) {
         for (int k = 0; k < BODIES; k++) {
             bst_od_observation z[DIRECTIONS];
             /* the low one within a revolution */
-            const double at_s = k < 4 ? times_s[pass] : 600.0 + 1500.0 * pass;
+            const double at_s = k < 2 ? times_s[pass] : 600.0 + 1500.0 * pass;
             arc_of(k, at_s + 30.0 * k, 10 * pass + k, z);
             const int at = bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S);
             if (pass == 0) {
@@ -97,8 +94,8 @@ static void directions_are_thinned_out(void **state) {
     const bst_od_motion motion = {.forces = NULL};
     bst_od_observation z[DIRECTIONS];
     l = (bst_od_linker){.count = 0};
-    for (int pass = 0; pass < 7; pass++) {
-        arc_of(2, 600.0 + 6000.0 * pass, pass, z);
+    for (int pass = 0; pass < 5; pass++) {
+        arc_of(0, 600.0 + 6000.0 * pass, pass, z);
         assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S), 0);
         assert_int_equal(l.items[0].arcs, pass + 1);
         assert_true(l.items[0].count <= BST_OD_LINK_DIRECTIONS);
