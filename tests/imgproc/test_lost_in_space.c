@@ -35,16 +35,23 @@ static int teardown(void **state) {
     return 0;
 }
 
-/* Solves the detections that were drawn in a window. */
-static void solve_window(scene *s, int count, bst_window window) {
+/* Solves the detections that were drawn in a window.
+ *
+ * Given:     near  an attitude that is tried first; NULL: none */
+static void solve_near(scene *s, int count, bst_window window,
+                       const bst_lost_in_space_result *near) {
     bst_lost_in_space *lost;
     bst_assert_ok(&s->ctx, bst_lost_in_space_create(&s->ctx, &s->drawn.camera, s->onboard,
                                                     s->patterns, YEAR, BST_RANDOM_SKY_ROOM, &lost));
     const bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
     const bst_lost_in_space_frame frame = {s->drawn.items,  count, window, V_LIMIT,
-                                           &s->drawn.light, NULL,  NULL};
+                                           &s->drawn.light, NULL,  near};
     bst_assert_ok(&s->ctx, bst_lost_in_space_solve(&s->ctx, lost, &options, &frame, &s->result));
     bst_lost_in_space_free(lost);
+}
+
+static void solve_window(scene *s, int count, bst_window window) {
+    solve_near(s, count, window, NULL);
 }
 
 static void solve(scene *s, int count) {
@@ -89,6 +96,28 @@ static void random_fields_are_solved(void **state) {
     print_message("%d of %d fields solved\n", solved, tried);
     assert_true(tried >= 99);
     assert_true(solved >= tried - 1);
+}
+
+/* An attitude a few pixels off is improved without a search, a wrong one does no harm. */
+static void an_earlier_attitude_is_tried_first(void **state) {
+    scene *s = *state;
+    const bst_window whole = {0, 0, 1024, 1024};
+    bst_random_sky_options o = usual();
+    bst_random_sky_draw(&o, s->sky, s->onboard, 29, 0, &s->drawn);
+    solve(s, s->drawn.count);
+    assert_true(s->result.solved && s->result.quads > 0);
+    const bst_lost_in_space_result first = s->result;
+    const bst_vec3 turn[] = {{4.0 * bst_camera_scale_rad(&s->drawn.camera), 0.0, 0.0},
+                             {0.3, 0.2, 0.1}};
+    for (int i = 0; i < 2; i++) {
+        bst_lost_in_space_result near = first;
+        near.q_cam_from_gcrf = bst_quat_mul(bst_quat_from_rotvec(turn[i]), near.q_cam_from_gcrf);
+        solve_near(s, s->drawn.count, whole, &near);
+        assert_true(s->result.solved);
+        assert_int_equal(s->result.quads > 0, i);
+        bst_assert_close(s->result.scale, first.scale, 1e-6); /* the same stars, fitted alike */
+        assert_true(off_px(s) < 0.6);
+    }
 }
 
 /* Neither a mirrored sky nor stars in other places look like any part of it. */
@@ -409,6 +438,7 @@ static void the_fit_is_exact(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_fields_are_solved),
+        cmocka_unit_test(an_earlier_attitude_is_tried_first),
         cmocka_unit_test(wrong_skies_are_not_solved),
         cmocka_unit_test(patterns_must_fit_their_four_stars),
         cmocka_unit_test(streaks_in_a_window),
