@@ -44,7 +44,8 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, initiation_gap_s, "s", 1e-3, 1e4, "5",
              "Longest time between the two detections that start a track."),
     BST_INT(C, max_misses, "", 0, 10000, "12",
-            "Frames in a row without a detection after which a confirmed track is deleted."),
+            "Frames in a row without a detection after which a confirmed track is deleted. Tracks "
+            "that the cue explains, and the target, are kept for max_coast_s."),
     BST_REAL(C, max_coast_s, "s", 0, 1e6, "120",
              "Longest time without a detection, in the field or not."),
     BST_REAL(C, max_sigma_arcsec, "arcsec", 0.01, 1e6, "60",

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 
 #include "imgproc/detect/background.h"
-#include "imgproc/measure/source_moments.h"
 #include "sim/core/cholesky.h"
 
 /* The test by second derivatives, taken as differences between pixels, finds at least this share of
@@ -14,10 +13,11 @@ static const double FOUND_SHARE = 0.4;
 /* Shares of the light in the fainter source from which the fit starts: equal and 4:1. */
 static const double START_SHARE[3] = {0.5, 0.2, 0.8};
 /* A pair farther apart than NEAR_FWHM needs more gain: noise anywhere on the stamp, of some 16
- * places, may be its second source; exp(-5.5 / 2) is 1/16. */
-static const double NEAR_FWHM = 1.0, ELSEWHERE = 5.5;
+ * places, may be its second source; exp(-5.5 / 2) is 1/16.
+ * On a streak of known motion it may be anywhere along the path: 1/2. */
+static const double NEAR_FWHM = 1.0, ELSEWHERE = 5.5, ON_PATH = 1.4;
 /* A streak of unknown rate is preferred to a pair if its chi-square is lower by this: a likelihood
- * ratio of exp(2) = 7, a design choice. Fainter ones cannot be told apart
+ * ratio of exp(2) = 7, a design choice. Fainter ones cannot be separated
  * (tests/imgproc/pair_resolution.c, `moving`). */
 static const double STREAK_LEAD = 4.0;
 /* Least number of bright sources whose median width is preferred to that of the known PSF, and the
@@ -156,16 +156,112 @@ static double fit_pair(bst_fit *fit, const bst_fit_request *single, bst_imgproc_
     return bst_fit_run(fit, &request) ? out[0].chi_square : INFINITY;
 }
 
-/* Chi-square of the source as a streak of its own on the same pixels; infinity: it shows none. */
-static double own_streak(const bst_imgproc_worker *w, int i, const bst_imgproc_stamp *stamp) {
+/* Chi-square of a source drawn along the path `d`; infinity if the fit fails. */
+static double chi_of_path(const bst_imgproc_worker *w, int i, const bst_imgproc_found *from,
+                          const bst_imgproc_stamp *stamp, const double d[2]) {
+    bst_imgproc_found streak = *from;
+    streak.source.shape.dx_px = d[0];
+    streak.source.shape.dy_px = d[1];
+    return bst_deblend_fit(w, i, &streak, stamp, false) ? streak.source.chi_square : INFINITY;
+}
+
+/* Least chi-square of the source as a streak of unknown motion, by parabolas along and across a
+ * path of the variance of its elongation; infinity: the fit fails. */
+static double own_streak(const bst_imgproc_worker *w, int i, const bst_imgproc_source *one,
+                         const bst_imgproc_stamp *stamp, double variance, double angle) {
     bst_imgproc_found streak = w->l->found[i];
-    streak.snr = streak.source.flux_e * bst_locate_norm(w->f, false) / streak.noise_e;
-    if (streak.streak || streak.snr < BST_EXTENT_SNR) {
+    if (streak.streak || !(variance > 0.0)) {
         return INFINITY;
     }
-    bst_source_moments_own_streak(w, i, &streak);
-    return streak.streak && bst_deblend_fit(w, i, &streak, stamp, false) ? streak.source.chi_square
-                                                                         : INFINITY;
+    streak.source = *one;
+    double length = sqrt(12.0 * variance), d[2] = {length * cos(angle), length * sin(angle)};
+    double lowest = chi_of_path(w, i, &streak, stamp, d);
+    for (int round = 0; round < 6 && isfinite(lowest); round++) {
+        double share = round < 2 ? 0.2 : round < 4 ? 0.1 : 0.04;
+        double h[2] = {share * (round % 2 ? -d[1] : d[0]), share * (round % 2 ? d[0] : d[1])};
+        double low = chi_of_path(w, i, &streak, stamp, (double[2]){d[0] - h[0], d[1] - h[1]});
+        double high = chi_of_path(w, i, &streak, stamp, (double[2]){d[0] + h[0], d[1] + h[1]});
+        double bend = low + high - 2.0 * lowest;
+        double step = bend > 0.0 ? 0.5 * (low - high) / bend : low < high ? -2.0 : 2.0;
+        step = fmax(-2.0, fmin(step, 2.0));
+        const double there[2] = {d[0] + step * h[0], d[1] + step * h[1]};
+        double chi = chi_of_path(w, i, &streak, stamp, there);
+        if (chi < lowest) {
+            lowest = chi;
+            d[0] = there[0];
+            d[1] = there[1];
+        }
+    }
+    return lowest;
+}
+
+/* What the residuals of the single source suggest: elongation (its variance along `angle`), and a
+ * second source. */
+typedef struct suggestion {
+    double variance_px2, angle;
+    residue rest;
+} suggestion;
+
+/* Fits the single source of the request and reads its residuals. False: nothing hints at a pair. */
+static bool find_suggestion(bst_fit *fit, const bst_fit_request *single, double least_gain,
+                            suggestion *out) {
+    double q[3], expected;
+    const bst_imgproc_source *one = single->free[0];
+    if (!bst_fit_run(fit, single) ||
+        !find_elongation(fit, single->data, single->stamp, one, q, &expected)) {
+        return false;
+    }
+    out->rest = find_remainder(fit, single->data, single->stamp, one);
+    /* the greater eigenvalue of [xx, xy; xy, yy], and its direction */
+    out->variance_px2 = 0.5 * (q[0] + q[2]) + hypot(0.5 * (q[0] - q[2]), q[1]);
+    out->angle = 0.5 * atan2(2.0 * q[1], q[0] - q[2]);
+    return fmax(expected, out->rest.snr * out->rest.snr) >= FOUND_SHARE * least_gain;
+}
+
+/* Best pair of all starts: sets its sources and its gain. Returns the start: 3, beside the single
+ * source; -1: none. */
+static int fit_best(bst_fit *fit, const bst_fit_request *single, const suggestion *hint,
+                    bst_pair *out) {
+    const bst_imgproc_source *one = single->free[0];
+    double lowest = INFINITY;
+    int best = -1;
+    for (int k = hint->variance_px2 > 0.0 ? 0 : 3; k < (hint->rest.snr > 0.0 ? 4 : 3); k++) {
+        bst_imgproc_source both[2] = {*one, *one};
+        if (k < 3) {
+            double length = sqrt(hint->variance_px2 / (START_SHARE[k] * (1.0 - START_SHARE[k])));
+            const double d[2] = {length * cos(hint->angle), length * sin(hint->angle)};
+            start_pair(one, START_SHARE[k], d, both);
+        } else {
+            both[1].shape.x_px = hint->rest.x_px;
+            both[1].shape.y_px = hint->rest.y_px;
+            both[1].flux_e = hint->rest.flux_e;
+        }
+        double chi = fit_pair(fit, single, both);
+        if (chi < lowest) {
+            lowest = chi;
+            best = k;
+            out->source[0] = both[0];
+            out->source[1] = both[1];
+        }
+    }
+    out->gain = one->chi_square - lowest;
+    return best;
+}
+
+/* Puts the brighter source first and sets both covariances: a fit has that of its first source. */
+static bool finish_pair(bst_fit *fit, const bst_fit_request *single, bst_pair *pair) {
+    if (pair->source[1].flux_e > pair->source[0].flux_e) {
+        bst_imgproc_source first = pair->source[0];
+        pair->source[0] = pair->source[1];
+        pair->source[1] = first;
+    }
+    bool good = true;
+    for (int k = 1; k >= 0 && good; k--) {
+        bst_imgproc_source copy[2] = {pair->source[k], pair->source[1 - k]};
+        good = isfinite(fit_pair(fit, single, copy));
+        pair->source[k] = copy[0];
+    }
+    return good;
 }
 
 bool bst_pair_fit(const bst_imgproc_worker *w, int i, double widening_px2, double least_gain,
@@ -190,65 +286,21 @@ bool bst_pair_fit(const bst_imgproc_worker *w, int i, double widening_px2, doubl
         .fixed = c.fixed,
         .fixed_count = c.fixed_count,
         .limit_px = bst_deblend_fit_limit(f, hypot(one.shape.dx_px, one.shape.dy_px))};
-    double q[3], expected;
-    if (c.free_count != 1 || !bst_fit_run(w->fit, &single) ||
-        !find_elongation(w->fit, &data, &stamp, &one, q, &expected)) {
+    suggestion hint;
+    int start = c.free_count == 1 && find_suggestion(w->fit, &single, least_gain, &hint)
+                    ? fit_best(w->fit, &single, &hint, out)
+                    : -1;
+    if (start < 0) {
         return false;
     }
-    residue rest = find_remainder(w->fit, &data, &stamp, &one);
-    if (fmax(expected, rest.snr * rest.snr) < FOUND_SHARE * least_gain) {
-        return false;
-    }
-    /* the greater eigenvalue of [xx, xy; xy, yy], and its direction */
-    double mean = 0.5 * (q[0] + q[2]), half = hypot(0.5 * (q[0] - q[2]), q[1]);
-    double variance = mean + half, angle = 0.5 * atan2(2.0 * q[1], q[0] - q[2]);
-    double lowest = INFINITY;
-    for (int k = variance > 0.0 ? 0 : 3; k < 4; k++) {
-        bst_imgproc_source both[2] = {one, one};
-        if (k < 3) {
-            double length = sqrt(variance / (START_SHARE[k] * (1.0 - START_SHARE[k])));
-            const double d[2] = {length * cos(angle), length * sin(angle)};
-            start_pair(&one, START_SHARE[k], d, both);
-        } else if (rest.snr > 0.0) {
-            both[1].shape.x_px = rest.x_px;
-            both[1].shape.y_px = rest.y_px;
-            both[1].flux_e = rest.flux_e;
-        } else {
-            continue;
-        }
-        double chi = fit_pair(w->fit, &single, both);
-        if (chi < lowest) {
-            lowest = chi;
-            out->source[0] = both[0];
-            out->source[1] = both[1];
-        }
-    }
-    out->gain = one.chi_square - lowest;
     double dx = out->source[1].shape.x_px - out->source[0].shape.x_px;
     double dy = out->source[1].shape.y_px - out->source[0].shape.y_px;
     double apart = hypot(dx, dy) / (BST_FWHM_PER_SIGMA * f->sigma_px);
-    if (!(out->gain > least_gain + (apart > NEAR_FWHM ? ELSEWHERE : 0.0)) ||
-        own_streak(w, i, &stamp) <= lowest - STREAK_LEAD) {
-        return false;
-    }
-    if (out->source[1].flux_e > out->source[0].flux_e) {
-        bst_imgproc_source first = out->source[0];
-        out->source[0] = out->source[1];
-        out->source[1] = first;
-    }
-    /* a fit has the covariance of its first source */
-    for (int k = 1; k >= 0; k--) {
-        bst_imgproc_source copy[2] = {out->source[k], out->source[1 - k]},
-                           *both[2] = {&copy[0], &copy[1]};
-        bst_fit_request request = single;
-        request.free = both;
-        request.free_count = 2;
-        if (!bst_fit_run(w->fit, &request)) {
-            return false;
-        }
-        out->source[k] = copy[0];
-    }
-    return true;
+    double more = found->streak && start < 3 ? ON_PATH : apart < NEAR_FWHM ? 0.0 : ELSEWHERE;
+    double chi = one.chi_square - out->gain - STREAK_LEAD;
+    return out->gain > least_gain + more &&
+           own_streak(w, i, &one, &stamp, hint.variance_px2, hint.angle) > chi &&
+           finish_pair(w->fit, &single, out);
 }
 
 double bst_pair_least_gain(double rate) {
