@@ -147,10 +147,10 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     /* the part of `sharp` beyond image width (which `truth` covers): the local background */
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
     double sharp = s->sharp * bst_crlb_table_norm(bound, s->length) / truth->norm;
-    /* Saturated pixels are left out of the fit. Design choice: such a star has an SNR above 1000
-     * and with four times its bound an error of 0.01 px or less, below that of its blends and its
-     * bias. */
-    double worse = (s->saturated ? 4.0 : 1.0) / fmin(sharp, 1.0);
+    /* Saturated pixels are left out of the fit, whose covariance is that of the others: in images
+     * three stars of SNR 79,000 to 161,000 have errors of 1.6 to 2.0 times the bound. */
+    const double left_out = s->saturated ? 2.0 : 1.0;
+    double worse = left_out / fmin(sharp, 1.0);
     double open = b->drawn ? 0.0 : worse;
     /* `sharp` has the lower SNR of a shape already */
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
@@ -183,9 +183,9 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     shared_bias(g, s, drawn, light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
-    double scale = g->binning;
-    double a2 = crlb->var_along_px2 * widen_along * scale * scale * shape[0] * shape[0];
-    double b2 = crlb->var_across_px2 * widen_across * scale * scale * shape[1] * shape[1];
+    double scale = g->binning, unit2 = scale * scale * left_out * left_out;
+    double a2 = crlb->var_along_px2 * widen_along * unit2 * shape[0] * shape[0];
+    double b2 = crlb->var_across_px2 * widen_across * unit2 * shape[1] * shape[1];
     d->x_px = g->origin_x + scale * x;
     d->y_px = g->origin_y + scale * y;
     d->cov_xx = c * c * a2 + n * n * b2;

@@ -246,7 +246,7 @@ class Constellation(unittest.TestCase):
     @unittest.skipIf(FULL, "of the quick version, whose detections are all recorded")
     def test_places_of_objects_at_rest_have_their_covariance(self):
         """Objects that move by less than 4 px in an exposure: images have an RMS of 0.096 to 0.112 px (both axes) and a chi-square
-        above 25 for 0 to 0.2 % of them, with a mean of 1.92 to 1.98 below. The generator's above 25 are saturated targets."""
+        above 25 for 0 to 0.2 % of them, with a mean of 1.92 to 1.98 below."""
         valid = {(row[0], row[1]) for row in self.db.execute("SELECT sensor, exposure_id FROM track_frames WHERE attitude_valid")}
         chi, squares = [], []
         for row in self.db.execute(

@@ -454,14 +454,14 @@ static void room_is_for_the_brightest(void **state) {
     close_scene(&s);
 }
 
-/* A saturated source is placed four times as badly, and says so by its flag. */
+/* A saturated source is placed twice as badly, and says so by its flag and its covariance. */
 static void saturated_sources_are_placed_worse(void **state) {
     (void)state;
     scene s;
     open_scene(&s);
     s.calibration.phase_bias_px = 0.0;
     start(&s);
-    double off[2][2];
+    double off[2], stated[2];
     for (int k = 0; k < 2; k++) {
         s.truth->count = 0;
         bst_truth_item *item = add_source(&s, 1, 300.25, 200.75, electrons_of(&s, 200.0));
@@ -470,11 +470,11 @@ static void saturated_sources_are_placed_worse(void **state) {
         assert_int_equal(r.count, 1);
         const bst_detection *d = &r.items[0].detection;
         assert_true(((d->flags & BST_DETECTION_SATURATED) != 0) == (k == 1));
-        off[k][0] = d->x_px - 300.25;
-        off[k][1] = d->y_px - 200.75;
+        off[k] = d->x_px - 300.25 + 7.0 * (d->y_px - 200.75);
+        stated[k] = d->cov_xx + d->cov_yy;
     }
-    bst_assert_close(off[1][0] / off[0][0], 4.0, 1e-6); /* rounding of places */
-    bst_assert_close(off[1][1] / off[0][1], 4.0, 1e-6);
+    bst_assert_close(off[1] / off[0], 2.0, 1e-6); /* rounding of places */
+    bst_assert_close(stated[1] / stated[0], 4.0, 1e-6);
     close_scene(&s);
 }
 
