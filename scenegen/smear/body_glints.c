@@ -46,6 +46,24 @@ static void glint_offsets(void *user, double u, double *offsets) {
     }
 }
 
+/* Adds the surfaces of which the glint is near but beside the exposure: their light rises toward
+ * that end. */
+static int add_ends(glint_course *c, double widen_rad, bst_glint *glints, int count) {
+    static const double REACH = 5.0, STEP = 1.0 / 16.0; /* of glint.c */
+    double end[BST_GLINT_SURFACES], within[BST_GLINT_SURFACES];
+    for (int n = 0; n < 2; n++) {
+        glint_offsets(c, n, end);
+        glint_offsets(c, n == 0 ? STEP : 1.0 - STEP, within);
+        for (int i = 0; i < c->list->count && count < BST_BODY_GLINTS_MAX; i++) {
+            double lobe = c->list->items[i].lobe_rad + widen_rad, rise = within[i] - end[i];
+            if (end[i] < REACH * lobe && rise * 16.0 > 0.2 * lobe) {
+                glints[count++] = (bst_glint){n, fmin(STEP * lobe / rise, 1.0)};
+            }
+        }
+    }
+    return count;
+}
+
 int bst_body_glints_find(const bst_scene_source *source, const bst_body_glint_list *list,
                          double turn_rad, bst_satellite_pose *pose,
                          bst_glint glints[BST_BODY_GLINTS_MAX]) {
@@ -53,9 +71,12 @@ int bst_body_glints_find(const bst_scene_source *source, const bst_body_glint_li
     glint_course course = {source, list, pose};
     double half_sun_rad = 0.5 * BST_SUN_RADIUS_M / BST_AU_M; /* widens the lobes */
     int steps = (int)fmin(fmax(ceil(turn_rad / GLINT_STEP_RAD), FEWEST), MOST);
-    return list->count == 0 ? 0
-                            : bst_glint_find(list->items, list->count, half_sun_rad, steps,
-                                             glint_offsets, &course, glints, BST_BODY_GLINTS_MAX);
+    if (list->count == 0) {
+        return 0;
+    }
+    int count = bst_glint_find(list->items, list->count, half_sun_rad, steps, glint_offsets,
+                               &course, glints, BST_BODY_GLINTS_MAX);
+    return add_ends(&course, half_sun_rad, glints, count);
 }
 
 /* Adds the kinks of a facet between two of `steps` times.

@@ -5,10 +5,10 @@
 /* Shares of the tolerance for cells with a border, for curved surfaces, and for their borders; and
  * for the poses of models with curved surfaces, without, and where many blur the image. Together
  * with that of the nodes they are the whole. */
-#define CELL_SHARE 0.4
+#define CELL_SHARE 0.35
 #define CURVED_SHARE 0.12
-#define LIMB_SHARE 0.06
-#define CURVED_POSES_SHARE 0.15
+#define LIMB_SHARE 0.05
+#define CURVED_POSES_SHARE 0.12
 #define POSES_SHARE 0.4
 #define BLURRED_POSES_SHARE 0.6
 /* Light of the pixel with the largest error, over that of the body: the derivative of a border's
@@ -22,13 +22,15 @@
  * measured for satellites of scenarios/satellites, at most 2 where lobes are narrow. */
 #define CURVED_ERROR 1.5
 /* Share of the tolerance by the borders of stamps: of nodes in even light all add up. */
-#define STAMP_SHARE 0.06
+#define STAMP_SHARE 0.08
 /* Error by cells in which borders of curved surfaces and shadows meet, over the light of a pixel
  * and the side in px: 0.0005 for falcon_9_second_stage, 0.0008 for iss_like, with 10^4 electrons.
  */
 #define CURVED_CELL 1e-3
 /* The same for a facet that turns into the light: a larger error asks for poses beside it. */
 #define KINK_SHARE 0.03
+/* Light of the brightest facet over the mean that is expected, at most. */
+#define BRIGHTER 4.0
 /* Least error of borders of curved surfaces and between their parts that is asked for, px. */
 #define LIMB_LEAST_PX 1e-5
 /* Motion of borders of shadows over that of the body, about. */
@@ -70,7 +72,9 @@ double bst_body_cell_px(const bst_body_image_plan *p, bool light_only, bool blur
     enum { FINEST = 32, ACROSS = 32, MOST_ACROSS = 4096 };
     const bst_smear *s = p->s;
     double across_px = 2.0 * bst_smear_radius_px(s, p->source);
-    double side = light_only && blurred ? 1.0 : 0.5;
+    /* errors of nodes of some poses have the same signs */
+    bool some = light_only && p->times.count > 1;
+    double side = light_only && blurred ? 1.0 : some ? 0.25 : 0.5;
     double allowed_e = CELL_SHARE * s->options.tolerance_sigma * border_noise_e(s, p->light_e);
     while (!light_only && !blurred && side > 1.0 / FINEST &&
            cell_error(s, p->source, side) * p->light_e > allowed_e &&
@@ -91,7 +95,8 @@ void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, boo
     const bst_smear *s = p->s;
     double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
     double sigmas = (p->moved_px + FASTER * p->turned_px) / sigma_px;
-    double poses = fmax(0.5 * sigmas, 4.0), missed_e = p->light_e / (8.0 * poses * poses);
+    double poses = fmax(0.5 * sigmas, 4.0),
+           missed_e = BRIGHTER * p->light_e / (8.0 * poses * poses);
     double allowed_e = KINK_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
     double least_rad = allowed_e / fmax(missed_e, 1e-9);
     int kinks = least_rad < p->turn_rad

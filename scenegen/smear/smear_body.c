@@ -22,7 +22,9 @@
 
 /* An image whose predicted error without its nodes is above that share of the tolerance, because it
  * is brighter than expected, is drawn again for the light that it has. */
-#define IMAGE_LIMIT 0.8
+#define IMAGE_LIMIT 0.74
+/* The same of flat surfaces with few poses, which take less. */
+#define FLAT_LIMIT 0.55
 /* Error of neighbouring nodes together, over the largest of one. */
 #define NEIGHBOURS 1.25
 /* The same where the image is that of some poses, of which the errors have the same signs. */
@@ -400,7 +402,8 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
             return BST_OK;
         }
         bst_body_set_error(&d, b, &light_e, &curved_e);
-        if (b->sigma <= IMAGE_LIMIT * s->options.tolerance_sigma ||
+        bool flat = b->satellite->curved_count == 0 && !b->blurred;
+        if (b->sigma <= (flat ? FLAT_LIMIT : IMAGE_LIMIT) * s->options.tolerance_sigma ||
             (round > 0 && b->sigma > 0.9 * before)) {
             break;
         }
