@@ -4,9 +4,13 @@
 
 #include "scenegen/smear/gauss_legendre.h"
 
-/* Largest motion of a panel of the quadrature with one to four points, PSF sigmas: the error of
- * integrating an edge's image over it is below 1e-4. */
+/* Largest motion of a panel of the quadrature with one to four points, PSF sigmas, for which the
+ * error of the integral of an edge's image over it is PANEL_ERROR: with n points it is in
+ * proportion to the power 2 n of the motion, and over p panels it is PANEL_ERROR / p of the light,
+ * beside pixels with a light of PANEL_LIGHT / p at least. tests/scenegen/test_body_poses.c compares
+ * these bounds with integrals. */
 static const double gauss_reach[BST_SMEAR_GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
+static const double PANEL_ERROR = 1.2e-4, PANEL_LIGHT = 0.08;
 
 /* Graded poses, for images that move by GRADED sigmas or more: the midpoint rule in s with
  * u'(s) = STEP (1 - NARROW (exp(-(s / WIDE)^2) + exp(-((n - s) / WIDE)^2))), steps that are NARROW
@@ -23,58 +27,135 @@ static double graded_more(void) {
     return NARROW * WIDE * sqrt(BST_PI);
 }
 
-static double graded_error(double step, double sigmas) {
+/* Sets error and light of graded poses with a step, PSF sigmas. Glints make the density uneven. */
+static void graded_error(const bst_body_times_aim *aim, double step, bst_body_times *out) {
     double ends = step / 2.4;
-    return (step * exp(-2.0 * BST_PI * BST_PI / (step * step)) / BST_PI + ENDS * ends * ends) /
-           sigmas;
+    out->error =
+        (step * exp(-2.0 * BST_PI * BST_PI / (step * step)) / BST_PI + ENDS * ends * ends) /
+        aim->sigmas * (aim->glint_count > 0 ? 2.0 : 1.0);
+    out->light = fmin((step < ALIASED ? AT_END : WIDE) * step / aim->sigmas, 1.0);
 }
 
-/* Steps near both ends are shorter than in the middle. */
-static void choose_graded(double sigmas, int count, double step, bst_body_times *out) {
-    double half = 0.5 * graded_more(), sum = 0.0;
-    for (int k = 0; k < count; k++) {
-        double from = (k + 0.5) / WIDE, to = (count - k - 0.5) / WIDE;
-        double u = (k + 0.5 - half * (erf(from) + erf(count / WIDE) - erf(to))) /
-                   (count - 2.0 * half * erf(count / WIDE));
-        out->u[k] = u;
-        out->weight[k] = 1.0 - NARROW * (exp(-from * from) + exp(-to * to));
+double bst_body_times_sigma(const bst_body_times *t, double pose_e, double light_e,
+                            double dark_variance_e2) {
+    return t->error * pose_e / sqrt(t->light * light_e + dark_variance_e2);
+}
+
+static bool fits(const bst_body_times_aim *aim, const bst_body_times *t) {
+    return bst_body_times_sigma(t, aim->pose_e, aim->light_e, aim->dark_variance_e2) <=
+           aim->allowed_sigma;
+}
+
+/* About a glint poses follow each other by GLINT_STEP of the width of the lobe, and at a distance
+ * from it by GLINT_GROWTH of that: equal steps in s with u - glint = (GLINT_STEP per /
+ * GLINT_GROWTH) sinh(GLINT_GROWTH s), of which the midpoint rule errs by exp(-pi^2 / GLINT_GROWTH).
+ */
+static const double GLINT_STEP = 0.4, GLINT_GROWTH = 0.7;
+
+/* Poses that the glints take in addition before time u. *density: their derivative. */
+static double glint_poses(const bst_glint *glints, int count, double u, double *density) {
+    double sum = 0.0;
+    *density = 0.0;
+    for (int i = 0; i < count; i++) {
+        double step = GLINT_STEP * glints[i].per, at = GLINT_GROWTH * (u - glints[i].u) / step;
+        double start = -GLINT_GROWTH * glints[i].u / step;
+        sum += (asinh(at) - asinh(start)) / GLINT_GROWTH;
+        *density += 1.0 / (step * sqrt(1.0 + at * at));
+    }
+    return sum;
+}
+
+/* Time of the graded pose s of `count`, which may be a fraction, and its derivative: steps near
+ * both ends are shorter than in the middle. */
+static double graded_time(double s, double count, double *step) {
+    double half = 0.5 * graded_more(), from = s / WIDE, to = (count - s) / WIDE;
+    double length = count - 2.0 * half * erf(count / WIDE);
+    *step = (1.0 - NARROW * (exp(-from * from) + exp(-to * to))) / length;
+    return (s - half * (erf(from) + erf(count / WIDE) - erf(to))) / length;
+}
+
+/* Sets poses that are graded and, where surfaces glint, closer: the midpoint rule in the number of
+ * graded poses and those for the glints together. */
+static void choose_graded(const bst_body_times_aim *aim, int count, double step,
+                          bst_body_times *out) {
+    const bst_glint *glints = aim->glints;
+    int glint_count = aim->glint_count;
+    double density, more = glint_poses(glints, glint_count, 1.0, &density), sum = 0.0;
+    int all = (int)fmin(count + ceil(more), BST_BODY_POSES_MAX);
+    double scale = (count + more) / all;
+    for (int k = 0; k < all; k++) {
+        double wanted = (k + 0.5) * scale, low = 0.0, high = count, s = wanted, du;
+        for (int i = 0; i < 60 && glint_count > 0; i++) {
+            s = 0.5 * (low + high);
+            double before = glint_poses(glints, glint_count, graded_time(s, count, &du), &density);
+            *(s + before < wanted ? &low : &high) = s;
+        }
+        out->u[k] = graded_time(s, count, &du);
+        (void)glint_poses(glints, glint_count, out->u[k], &density);
+        out->weight[k] = du / (1.0 + density * du);
         sum += out->weight[k];
     }
-    for (int k = 0; k < count; k++) {
+    for (int k = 0; k < all; k++) {
         out->weight[k] /= sum;
     }
-    out->count = count;
-    out->error = graded_error(step, sigmas);
-    out->light = fmin((step < ALIASED ? AT_END : WIDE) * step / sigmas, 1.0);
+    out->count = all;
+    graded_error(aim, step, out);
 }
 
-/* The number of graded poses for an error. *step: in the middle, sigmas. */
-static int graded_count(double sigmas, double allowed, double *step) {
-    double longest = LONGEST, count;
-    while (longest > SHORTEST && graded_error(longest, sigmas) > allowed) {
+/* The number of graded poses. *step: in the middle, sigmas. */
+static int graded_count(const bst_body_times_aim *aim, double *step) {
+    double longest = fmin(LONGEST, aim->sigmas * LONGEST / GRADED);
+    double least = fmin(SHORTEST, 0.1 * longest);
+    bst_body_times t;
+    graded_error(aim, longest, &t);
+    while (longest > least && !fits(aim, &t)) {
         longest *= STEP_RATIO;
+        graded_error(aim, longest, &t);
     }
-    count = fmin(ceil(sigmas / longest + graded_more()), BST_BODY_POSES_MAX);
-    *step = sigmas / (count - graded_more());
+    double count = fmin(ceil(aim->sigmas / longest + graded_more()), BST_BODY_POSES_MAX);
+    *step = aim->sigmas / (count - graded_more());
     return (int)count;
 }
 
-void bst_body_times_choose(double sigmas, double allowed, bst_body_times *out) {
-    int order = 0, graded = BST_BODY_POSES_MAX;
+/* Sets error and light of a number of panels with `order` + 1 points. */
+static void panel_error(const bst_body_times_aim *aim, int order, double panels,
+                        bst_body_times *out) {
+    double parts = aim->sigmas / gauss_reach[order] / panels;
+    out->error = PANEL_ERROR / panels * pow(parts, 2.0 * order + 2.0);
+    out->light = PANEL_LIGHT / panels;
+}
+
+static int panel_count(const bst_body_times_aim *aim, int order) {
+    double most = floor(BST_BODY_POSES_MAX / (order + 1.0));
+    double count = fmax(ceil(aim->sigmas / gauss_reach[order] - 1e-9), 1.0);
+    bst_body_times t;
+    panel_error(aim, order, count, &t);
+    while (count < most && !fits(aim, &t)) {
+        count = ceil(1.05 * count);
+        panel_error(aim, order, count, &t);
+    }
+    return (int)fmin(count, most);
+}
+
+void bst_body_times_choose(const bst_body_times_aim *aim, bst_body_times *out) {
+    int order = 0, panels = panel_count(aim, 0), graded = BST_BODY_POSES_MAX + 1;
     double step = 0.0;
-    while (order + 1 < BST_SMEAR_GAUSS_MOST && sigmas > gauss_reach[order]) {
-        order++;
+    for (int k = 1; k < BST_SMEAR_GAUSS_MOST; k++) {
+        int count = panel_count(aim, k);
+        if (count * (k + 1) < panels * (order + 1)) {
+            order = k;
+            panels = count;
+        }
     }
-    int panels = (int)fmin(fmax(ceil(sigmas / gauss_reach[order]), 1.0), BST_BODY_POSES_MAX);
-    if (sigmas >= GRADED) {
-        graded = graded_count(sigmas, allowed, &step);
+    if (aim->sigmas >= GRADED || aim->glint_count > 0) {
+        graded = graded_count(aim, &step);
     }
-    if (graded < panels * (order + 1)) {
-        choose_graded(sigmas, graded, step, out);
+    if (graded < panels * (order + 1) || aim->glint_count > 0) {
+        choose_graded(aim, graded, step, out);
         return;
     }
-    out->error = out->count = 0;
-    out->light = 1.0;
+    panel_error(aim, order, panels, out);
+    out->count = 0;
     for (int p = 0; p < panels; p++) {
         for (int k = 0; k <= order; k++) {
             out->u[out->count] = (p + bst_smear_gauss_place[order][k]) / panels;

@@ -3,6 +3,7 @@
 #define BST_SCENEGEN_SMEAR_BODY_POSES_H
 
 #include "sim/core/parallel.h"
+#include "sim/satellite/glint.h"
 #include "sim/world/scene/source_body.h"
 
 enum { BST_BODY_POSES_MAX = 1024 };
@@ -15,12 +16,28 @@ typedef struct bst_body_times {
     double light; /* where it is: light at least, over that of the body */
 } bst_body_times;
 
-/* Chooses the poses for an image that moves by that many PSF sigmas.
+/* Error of the poses, in sigma of a pixel.
  *
- * Given:     allowed  error of the light at a border, over that of the body
- * Returned:  out      its error is larger than allowed if that takes more than BST_BODY_POSES_MAX
- *                     poses or steps below half a sigma */
-void bst_body_times_choose(double sigmas, double allowed, bst_body_times *out);
+ * Given:     pose_e   light of a pixel in one pose, electrons in the exposure
+ *            light_e  the same in all poses together */
+double bst_body_times_sigma(const bst_body_times *times, double pose_e, double light_e,
+                            double dark_variance_e2);
+
+/* Requirements of the poses. */
+typedef struct bst_body_times_aim {
+    double sigmas;                                           /* motion of the image, PSF sigmas */
+    double pose_e, light_e, dark_variance_e2, allowed_sigma; /* see bst_body_times_sigma */
+    /* glints of the surfaces, with u and per as fractions of the exposure: about them poses follow
+     * each other by less than half of the lobe's width */
+    const bst_glint *glints;
+    int glint_count;
+} bst_body_times_aim;
+
+/* Chooses the poses of an image that moves.
+ *
+ * Returned:  out  its error is larger than allowed if that takes more than BST_BODY_POSES_MAX poses
+ *                 or steps below half a sigma */
+void bst_body_times_choose(const bst_body_times_aim *aim, bst_body_times *out);
 
 /* Poses are drawn in that many images, each with every so-manieth pose, and these are summed: the
  * same for any number of threads. */

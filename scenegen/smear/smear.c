@@ -484,7 +484,7 @@ static bst_status moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_sourc
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                             bst_kernel_source_record *out, bool *visible) {
     bst_smear_place at;
-    s->last_peak_e = s->last_read_e = s->chord_error = s->poses_sigma = 0.0;
+    s->last_peak_e = s->last_read_e = s->chord_error = s->body_sigma = 0.0;
     s->last_leaves = true;
     *visible = bst_smear_place_source(s, source, &at);
     s->disc_px = at.disc_px;

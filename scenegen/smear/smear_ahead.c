@@ -32,7 +32,7 @@ static void lend_frame(const bst_smear *s, bst_smear *own) {
     copy.points = own->points;
     copy.own_path = own->own_path;
     copy.own_capacity = own->own_capacity;
-    copy.last_peak_e = copy.last_read_e = copy.chord_error = copy.poses_sigma = 0.0;
+    copy.last_peak_e = copy.last_read_e = copy.chord_error = copy.body_sigma = 0.0;
     *own = copy;
 }
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "scenegen/reference.h"
+#include "scenegen/smear/body_precision.h"
 #include "scenegen/smear/image_nodes.h"
 #include "scenegen/smear/smear_internal.h"
 #include "sim/world/scene/los_track.h"
@@ -19,24 +20,15 @@
 #define POINT_PX 2.0
 #define IMAGE_PX 32.0
 
-/* Shares of the tolerance for cells with a border and for those of curved surfaces, and light of
- * the pixel with the largest error over that of the body. */
-#define CELL_SHARE 0.8
-#define LIMB_SHARE 0.1
-#define BORDER_LIGHT 0.01
-
-/* Share of the tolerance for the poses, and PSF sigmas from the end of the motion within which
- * their errors are small. */
-#define POSES_SHARE 0.7
-#define POSES_SIGMAS 5.0
-/* Motion of borders of shadows over that of the body, about. */
-#define FASTER 1.1
-
+/* An image whose predicted error without its nodes is above that share of the tolerance, because it
+ * is brighter than expected, is drawn again for the light that it has. */
+#define IMAGE_LIMIT 0.74
+/* The same of flat surfaces with few poses, which take less. */
+#define FLAT_LIMIT 0.55
 /* Error of neighbouring nodes together, over the largest of one. */
 #define NEIGHBOURS 1.25
-
-/* Poses of which the cells have borders at the same places. */
-enum { FEW_POSES = 16 };
+/* The same where the image is that of some poses, of which the errors have the same signs. */
+#define NEIGHBOURS_IN_POSES 1.7
 
 enum { PATH_TIMES = 64 };
 
@@ -46,6 +38,7 @@ void bst_smear_bodies_clear(bst_smear_bodies *bodies) {
         bst_resolved_free(bodies->items[i].image);
         bst_resolved_free(bodies->items[i].trial);
         bst_body_poses_free(&bodies->items[i].others);
+        free(bodies->items[i].glints.items);
     }
     free(bodies->items);
     bst_parallel_free(bodies->pool);
@@ -92,6 +85,7 @@ static bst_status body_of(bst_ctx *ctx, bst_smear *s, const bst_scene_source *so
         BST_TRY(bst_satellite_pose_create(ctx, satellite, &found->pose));
         BST_TRY(bst_resolved_create(ctx, satellite, &found->image));
         BST_TRY(bst_resolved_create(ctx, satellite, &found->trial));
+        BST_TRY(bst_body_glints_list(ctx, satellite, &found->glints));
     }
     found->id = source->id;
     found->frame = 0;
@@ -110,7 +104,7 @@ static void pose_at(const bst_smear *s, const bst_scene_source *source, double u
     view->q_image_from_body = bst_quat_mul(focal, bst_quat_conj(state.q_body_from_gcrf));
     view->origin_m = bst_vec3_scale(bst_quat_rotate(focal, state.apparent), state.range_m);
     view->scale_rad = bst_camera_scale_rad(&s->camera);
-    view->limb_px = 0.0;
+    view->limb_px = view->curved_px = 0.0;
     if (pose) {
         bst_source_body_set_pose(source, &state, pose);
     }
@@ -127,9 +121,9 @@ static double turn_between(bst_quat from, bst_quat to) {
     return bst_vec3_norm(bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from))));
 }
 
-/* Image motion in the exposure, px: of the body's origin, and of its parts by rotation. */
+/* Image motion in the exposure: of the body's origin, px, and the rotation of its parts, rad. */
 static void measure(const bst_smear *s, const bst_scene_source *source, double *moved_px,
-                    double *turned_px) {
+                    double *turn_rad) {
     bst_resolved_view before = {.scale_rad = 0.0}, view;
     double turn = 0.0;
     *moved_px = 0.0;
@@ -151,7 +145,7 @@ static void measure(const bst_smear *s, const bst_scene_source *source, double *
         const bst_joint *joint = &b->satellite->joints[j];
         turn += joint->follows == BST_JOINT_SPIN ? fabs(joint->rate_radps) * seconds : 0.0;
     }
-    *turned_px = turn * bst_smear_radius_px(s, source);
+    *turn_rad = turn;
 }
 
 /* Electrons per pixel of the body's lit and visible part, about: a body fills a third of the square
@@ -167,58 +161,6 @@ static double per_px_e(const bst_smear *s, const bst_scene_source *source) {
     double across_px = 2.0 * bst_smear_radius_px(s, source);
     double electrons = source->electrons_per_s * s->duration_s;
     return electrons / fmax(0.3 * lit * across_px * across_px, 1.0);
-}
-
-/* Error by cells with a border, of which the second moments are right to some 0.01 of the square of
- * the side, over the light of a pixel. */
-static double cell_error(const bst_smear *s, double side_px) {
-    double sides = side_px / s->sigma_px;
-    return sides * sides * sides / 480.0;
-}
-
-/* Error of borders of curved surfaces, px, that is LIMB_SHARE of the tolerance in a pixel beside
- * them: a border that is moved by 1 px changes it by 0.4 / sigma of the body's light. */
-static double limb_for(const bst_smear *s, const bst_scene_source *source) {
-    double light_e = per_px_e(s, source);
-    double allowed_e = LIMB_SHARE * s->options.tolerance_sigma *
-                       sqrt(BORDER_LIGHT * light_e + s->dark_variance_e2);
-    return allowed_e * s->sigma_px / (0.4 * fmax(light_e, 1e-9));
-}
-
-/* Side of the cells for the body, px: a power of two of pixels, or less for small bodies. */
-static double cell_for(const bst_smear *s, const bst_scene_source *source, int poses) {
-    enum { FINEST = 16, ACROSS = 32 };
-    double across_px = 2.0 * bst_smear_radius_px(s, source), light_e = per_px_e(s, source);
-    /* in a pixel beside a border */
-    double allowed_e = CELL_SHARE * s->options.tolerance_sigma *
-                       sqrt(BORDER_LIGHT * light_e + s->dark_variance_e2);
-    double side = 0.5;
-    /* the borders of many poses fall on all parts of the cells */
-    while (side > 1.0 / FINEST && cell_error(s, side) * light_e > allowed_e && poses <= FEW_POSES) {
-        side *= 0.5;
-    }
-    while (side > across_px / ACROSS) {
-        side *= 0.5;
-    }
-    return side;
-}
-
-/* Side of cells of which all second moments are known, px. */
-static double light_cell_for(const bst_smear *s, const bst_scene_source *source, int poses) {
-    enum { ACROSS = 32 };
-    double across_px = 2.0 * bst_smear_radius_px(s, source);
-    double side = poses > FEW_POSES ? 1.0 : 0.5; /* more: no straight borders at rest */
-    while (side > across_px / ACROSS) {
-        side *= 0.5;
-    }
-    return side;
-}
-
-/* Allowed error of the poses of an image that moves, over the light of a pixel. */
-static double poses_allowed(const bst_smear *s, const bst_scene_source *source, double sigmas) {
-    double light_e = per_px_e(s, source), part = fmin(POSES_SIGMAS / sigmas, 1.0);
-    return POSES_SHARE * s->options.tolerance_sigma * sqrt(part * light_e + s->dark_variance_e2) /
-           light_e;
 }
 
 /* Limits of the image: what can light the sensor. */
@@ -349,23 +291,16 @@ static bool find_box(const bst_smear *s, const bst_smear_body *b, const bst_scen
     return true;
 }
 
-/* What the poses of an image have in common. */
-typedef struct drawing {
-    const bst_smear *s;
-    const bst_scene_source *source;
-    bst_body_times times; /* weights with the factors on the light */
-    double limb_px;       /* see bst_resolved_view */
-} drawing;
-
 /* Adds pose k to an image: its light only, or with `light_only` false with cover and parts. */
-static bst_status draw(bst_ctx *ctx, const drawing *d, int k, bool light_only,
+static bst_status draw(bst_ctx *ctx, const bst_body_image_plan *d, int k, bool light_only,
                        bst_satellite_pose *pose, bst_resolved *image) {
     bst_earthlight earthlight;
     bst_resolved_light light;
     bst_resolved_view view;
     double weight = d->times.weight[k];
     pose_at(d->s, d->source, d->times.u[k], pose, &view, &light, &earthlight);
-    view.limb_px = d->limb_px;
+    view.curved_px = d->curved_px;
+    view.limb_px = fmin(d->limb_px, d->curved_px);
     return light_only ? bst_resolved_add_light(ctx, image, pose, &view, &light, weight)
                       : bst_resolved_add(ctx, image, pose, &view, &light, weight, NULL);
 }
@@ -377,13 +312,12 @@ static bst_status draw_light(bst_ctx *ctx, void *user, int k, bst_satellite_pose
 }
 
 /* Draws all poses in the box low to high. */
-static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, drawing *d,
+static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_body_image_plan *d,
                              const double low[2], const double high[2]) {
     bool light_only = bst_resolved_may_add_light(b->satellite);
-    b->cell_px = light_only ? light_cell_for(s, d->source, d->times.count)
-                            : cell_for(s, d->source, d->times.count);
+    b->cell_px = bst_body_cell_px(d, light_only, b->blurred);
     BST_TRY(bst_resolved_begin(ctx, b->image, low, high, b->cell_px));
-    d->limb_px = limb_for(s, d->source);
+    d->limb_px = bst_body_limb_px(s, d->light_e);
     double inverse = 1.0 / d->source->electrons_per_s;
     if (b->one_pose && d->source->rate) { /* the path has the rate */
         inverse /= bst_scene_source_rate_at(d->source, 0.5);
@@ -409,7 +343,7 @@ static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, draw
                                       .cell_px = b->cell_px,
                                       .scale_rad = bst_camera_scale_rad(&s->camera),
                                       .count = d->times.count,
-                                      .blurred = d->times.count > FEW_POSES,
+                                      .blurred = b->blurred && bst_body_even(d),
                                       .draw = draw_light,
                                       .user = d,
                                       .pool = pool};
@@ -421,46 +355,61 @@ static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, draw
     return BST_OK;
 }
 
-/* Makes the image of a source for the frame. *there false: a part of the body is beside the
- * observer. */
-static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
-                             const bst_scene_source *source, bool *there) {
-    double moved_px, turned_px, low[2], high[2];
-    drawing d = {s, source, {.u = {0.5}, .weight = {1.0}, .count = 1}, 0.0};
-    measure(s, source, &moved_px, &turned_px);
-    b->one_pose = turned_px <= STILL_PX;
-    double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
+/* Draws the image of a source for an expected light in a pixel, in d->light_e. *there false: a part
+ * of the body is beside the observer. */
+static bst_status draw_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_body_image_plan *d,
+                             bool *there) {
+    double low[2], high[2];
+    d->times = (bst_body_times){.u = {0.5}, .weight = {1.0}, .count = 1, .light = 1.0};
+    b->blurred = false;
     if (!b->one_pose) {
-        double sigmas = (moved_px + FASTER * turned_px) / sigma_px;
-        bst_body_times_choose(sigmas, poses_allowed(s, source, sigmas), &d.times);
+        bst_body_choose_poses(d, b->pose, &b->blurred);
     }
-    *there = find_box(s, b, source, &d.times, low, high);
+    *there = find_box(s, b, d->source, &d->times, low, high);
     if (!*there) {
         return BST_OK;
     }
+    clip_box(s, b->one_pose ? d->moved_px : 0.0, low, high);
+    b->empty = !(low[0] < high[0] && low[1] < high[1]);
+    b->frame = s->frame;
+    return b->empty ? BST_OK : draw_poses(ctx, s, b, d, low, high);
+}
+
+/* Makes the image of a source for the frame: again, finer, if its light turns out to be so bright
+ * that the error is too large. *there false: a part of the body is beside the observer. */
+static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
+                             const bst_scene_source *source, bool *there) {
+    enum { ROUNDS = 3 };
+    bst_body_image_plan d = {.s = s,
+                             .source = source,
+                             .light_e = per_px_e(s, source),
+                             .curved_px = BST_RESOLVED_CURVED_PX};
+    measure(s, source, &d.moved_px, &d.turn_rad);
+    d.turned_px = d.turn_rad * bst_smear_radius_px(s, source);
+    b->one_pose = d.turned_px <= STILL_PX;
     b->x0 = b->y0 = 0.0;
     if (b->one_pose) {
         (void)bst_smear_project(s, source, bst_los_track_attitude(&s->track, 0.5 * s->duration_s),
                                 bst_scene_source_direction(source, 0.5), &b->x0, &b->y0);
+    } else {
+        d.glint_count = bst_body_glints_find(source, &b->glints, d.turn_rad, b->pose, d.glints);
     }
-    clip_box(s, b->one_pose ? moved_px : 0.0, low, high);
-    b->empty = !(low[0] < high[0] && low[1] < high[1]);
-    b->frame = s->frame;
-    if (b->empty) {
-        return BST_OK;
+    b->sigma = 0.0;
+    for (int round = 0; round < ROUNDS; round++) {
+        double light_e, curved_e, before = b->sigma;
+        BST_TRY(draw_image(ctx, s, b, &d, there));
+        if (!*there || b->empty) {
+            return BST_OK;
+        }
+        bst_body_set_error(&d, b, &light_e, &curved_e);
+        bool flat = b->satellite->curved_count == 0 && !b->blurred;
+        if (b->sigma <= (flat ? FLAT_LIMIT : IMAGE_LIMIT) * s->options.tolerance_sigma ||
+            (round > 0 && b->sigma > 0.9 * before)) {
+            break;
+        }
+        d.light_e = fmax(light_e, 1.1 * d.light_e);
+        d.curved_px = bst_body_curved_px(s, curved_e);
     }
-    BST_TRY(draw_poses(ctx, s, b, &d, low, high));
-    b->error =
-        turned_px * turned_px * (b->one_pose ? 1.0 / 12.0 * 0.12 : 0.0) / (sigma_px * sigma_px);
-    b->blurred = d.times.count > FEW_POSES;
-    b->poses_error = d.times.error;
-    b->poses_light = d.times.light;
-    if (!bst_resolved_image_of(b->image)->second && d.times.count <= FEW_POSES) {
-        b->error += cell_error(s, b->cell_px);
-    }
-    /* a border that is moved by 1 px changes a pixel by 0.4 / sigma of the body's light; 0.5: the
-     * pixels on its dim side have less noise */
-    b->error += b->satellite->curved_count > 0 ? 0.5 * BST_RESOLVED_CURVED_PX / sigma_px : 0.0;
     return BST_OK;
 }
 
@@ -509,8 +458,8 @@ bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_sour
         s->last_peak_e = electrons * fmin(line * line * image.light, image.peak);
         s->last_read_e = electrons * fmin(image.light, image.peak * s->binning * s->binning);
     }
-    s->poses_sigma = b->poses_error * s->last_read_e /
-                     sqrt(b->poses_light * s->last_read_e + s->dark_variance_e2);
-    s->chord_error = b->error + NEIGHBOURS * image.error_e / fmax(s->last_read_e, 1e-9);
+    s->body_sigma = b->sigma;
+    double neighbours = b->one_pose || b->blurred ? NEIGHBOURS : NEIGHBOURS_IN_POSES;
+    s->chord_error = neighbours * image.error_e / fmax(s->last_read_e, 1e-9);
     return bst_extended_source_spread(ctx, &s->points, s->stretch, &s->nodes);
 }

@@ -2,6 +2,7 @@
 #ifndef BST_SCENEGEN_SMEAR_SMEAR_BODY_H
 #define BST_SCENEGEN_SMEAR_SMEAR_BODY_H
 
+#include "scenegen/smear/body_glints.h"
 #include "scenegen/smear/body_poses.h"
 #include "sim/world/scene/source_body.h"
 
@@ -16,12 +17,12 @@ typedef struct bst_smear_body {
     bst_body_poses others;       /* for images of many poses */
     int64_t frame;               /* for which the image is made; 0: none */
     double cell_px;
-    double x0, y0;                   /* origin of the image's positions, px from the boresight */
-    bool blurred;                    /* of more poses than FEW_POSES */
-    bool one_pose;                   /* the image of mid-exposure, to be moved along the path */
-    double error;                    /* of turning within a pose, relative to the brightest pixel */
-    double poses_error, poses_light; /* of the poses: see bst_body_times */
-    bool empty;                      /* no image */
+    double x0, y0; /* origin of the image's positions, px from the boresight */
+    bool blurred;  /* borders fall on all parts of the cells */
+    bool one_pose; /* the image of mid-exposure, to be moved along the path */
+    double sigma;  /* error of the image but for its nodes, sigma of a pixel */
+    bst_body_glint_list glints;
+    bool empty; /* no image */
 } bst_smear_body;
 
 /* The bodies of a camera's sources; zero-initialise it. */

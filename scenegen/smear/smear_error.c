@@ -155,9 +155,9 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
         .x_px = (float)d->x,
         .y_px = (float)d->y,
         .peak_e = (float)peak_e,
-        .nodes_e = (float)((flank * error + rounded) * peak_e + s->poses_sigma * sigma_e),
+        .nodes_e = (float)((flank * error + rounded) * peak_e + s->body_sigma * sigma_e),
         .predicted_e = (float)((flank_of(s, d, flank) * predicted + rounded) * peak_e +
-                               s->poses_sigma * sigma_e),
+                               s->body_sigma * sigma_e),
         .shared_e = (float)(shared * sigma_e),
         .excess_e = (float)(lost * peak_e),
         .border_e = (float)(s->last_peak_e * tail),

@@ -89,7 +89,8 @@ struct bst_smear {
     double last_peak_e, last_read_e, last_presence, last_widening_px2;
     bool last_leaves;
     double chord_error; /* error of the latest source's chord approximation, relative to its peak */
-    double poses_sigma; /* of the poses of the latest body, in sigma of the worst pixel */
+    double body_sigma;  /* of the latest body's image but for its nodes, in sigma of the worst
+                           pixel */
     double low[2], high[2]; /* box of a shared track's positions relative to a star's, px */
     bst_error_budget_source last_error;
     bst_smear_level levels[BST_SMEAR_LEVELS];
@@ -198,7 +199,7 @@ bst_status bst_smear_centre_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_so
                                   double x, double y, double tolerance) BST_MUST_CHECK;
 
 /* Nodes of a source with a body, relative to (x, y); also sets last_peak_e, last_read_e and
- * chord_error and poses_sigma. No nodes if it gives the sensor no light. *there false: the body has
+ * chord_error and body_sigma. No nodes if it gives the sensor no light. *there false: the body has
  * no image. */
 bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                 double x, double y, bool *there) BST_MUST_CHECK;

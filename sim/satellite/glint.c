@@ -72,7 +72,7 @@ double bst_glint_offset(const bst_glint_surface *s, const bst_satellite_pose *po
 typedef struct search {
     bst_glint_course course;
     void *user;
-    double *times;
+    bst_glint *glints;
     int most, count;
 } search;
 
@@ -106,29 +106,11 @@ static double least_between(const search *s, int surface, double low, double hig
     return at_a < at_b ? a : b;
 }
 
-/* Adds the times at which a glint has to be sampled.
- *
- * Given:     u     of least offset
- *            per   time in which the offset changes by the lobe's width */
-static void add_glint(search *s, double u, double per) {
-    static const double parts[] = {0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0, -4.0, 4.0};
-    enum { PARTS = sizeof parts / sizeof parts[0] };
-    if (s->count + PARTS > s->most) {
-        return;
-    }
-    for (int i = 0; i < PARTS; i++) {
-        double at = u + parts[i] * per;
-        if (at > 0.0 && at < 1.0) {
-            s->times[s->count++] = at;
-        }
-    }
-}
-
-int bst_glint_times(const bst_glint_surface *surfaces, int count, double widen_rad, int steps,
-                    bst_glint_course course, void *user, double *times, int most) {
-    assert(count >= 0 && count <= BST_GLINT_SURFACES && steps >= 2 && course && times);
+int bst_glint_find(const bst_glint_surface *surfaces, int count, double widen_rad, int steps,
+                   bst_glint_course course, void *user, bst_glint *glints, int most) {
+    assert(count >= 0 && count <= BST_GLINT_SURFACES && steps >= 2 && course && glints);
     double before[BST_GLINT_SURFACES], here[BST_GLINT_SURFACES], after[BST_GLINT_SURFACES];
-    search s = {course, user, times, most, 0};
+    search s = {course, user, glints, most, 0};
     double step = 1.0 / steps;
     course(user, -step, before);
     course(user, 0.0, here);
@@ -147,8 +129,8 @@ int bst_glint_times(const bst_glint_surface *surfaces, int count, double widen_r
             }
             double at = least_between(&s, i, u - step, u + step, &least);
             double fall = fmax(before[i], after[i]) - least;
-            if (least < REACH * lobe && fall > 0.2 * lobe) {
-                add_glint(&s, at, step * lobe / fall);
+            if (least < REACH * lobe && fall > 0.2 * lobe && s.count < most) {
+                s.glints[s.count++] = (bst_glint){at, step * lobe / fall};
             }
         }
         for (int i = 0; i < count; i++) {
@@ -157,4 +139,20 @@ int bst_glint_times(const bst_glint_surface *surfaces, int count, double widen_r
         }
     }
     return s.count;
+}
+
+int bst_glint_times(const bst_glint_surface *surfaces, int count, double widen_rad, int steps,
+                    bst_glint_course course, void *user, double *times, int most) {
+    static const double parts[] = {0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0, -4.0, 4.0};
+    enum { PARTS = sizeof parts / sizeof parts[0], MOST = 256 };
+    bst_glint glints[MOST];
+    int times_count = 0, room = most / PARTS < MOST ? most / PARTS : MOST;
+    int found = bst_glint_find(surfaces, count, widen_rad, steps, course, user, glints, room);
+    for (int i = 0; i < found * PARTS; i++) {
+        double at = glints[i / PARTS].u + parts[i % PARTS] * glints[i / PARTS].per;
+        if (at > 0.0 && at < 1.0) {
+            times[times_count++] = at;
+        }
+    }
+    return times_count;
 }

@@ -32,20 +32,33 @@ int bst_glint_surfaces(const bst_satellite *satellite, bst_glint_surface *surfac
 double bst_glint_offset(const bst_glint_surface *surface, const bst_satellite_pose *pose,
                         bst_vec3 half);
 
+/* A glint: the time of least offset, and the time in which the offset then changes by the width of
+ * the lobe; both as fractions of the span. */
+typedef struct bst_glint {
+    double u, per;
+} bst_glint;
+
 /* Offsets of all surfaces at one time.
  *
  * Returned:  offsets  by surface, rad */
 typedef void (*bst_glint_course)(void *user, double u, double *offsets);
 
-/* Finds the times in [0, 1] around which a light curve must be sampled densely because a surface
- * glints: places of least offset within five widths of the lobe, and times at fractions of the
- * lobe's width around them.
+/* Finds the glints in [0, 1]: places of least offset within five widths of the lobe.
  *
  * Given:     surfaces, count
  *            widen_rad  added to each lobe: what the Sun's disc adds
  *            steps      of the first scan; offsets may have one minimum in two steps
  *            course     offsets of all surfaces at a time
- *            most       room in `times`
+ *            most       room in `glints`
+ * Returned:  glints     u may be up to a step outside of [0, 1]
+ * Value:     their number; glints without room are left out, the latest first */
+int bst_glint_find(const bst_glint_surface *surfaces, int count, double widen_rad, int steps,
+                   bst_glint_course course, void *user, bst_glint *glints, int most);
+
+/* Finds the times around which a light curve must be sampled densely: those of bst_glint_find, and
+ * times at fractions of the lobe's width around them.
+ *
+ * Given:     as bst_glint_find; most: room in `times`
  * Returned:  times      unordered, within (0, 1)
  * Value:     their number; glints without room are left out, the latest first */
 int bst_glint_times(const bst_glint_surface *surfaces, int count, double widen_rad, int steps,

@@ -157,6 +157,7 @@ static void shade(const bst_resolved_adding *a) {
         s->from[0][f] = light.sun;
         s->from[1][f] = light.earth;
         s->wanted[f] = light.uniform + light.sun + light.earth > 0.0;
+        bst_resolved_note_light(a, &light, false);
     }
 }
 
@@ -319,6 +320,7 @@ void bst_resolved_join_light(bst_resolved *to, bst_resolved *from) {
     add_kept(&to->areas);
     add_kept(&from->areas);
     bst_area_sums_add(&to->areas.sums, &from->areas.sums);
+    to->image.surface_light = fmax(to->image.surface_light, from->image.surface_light);
 }
 
 void bst_resolved_end_light(bst_resolved *r, double scale_rad) {

@@ -184,6 +184,9 @@ static bst_status add_part(bst_ctx *ctx, const bst_resolved_adding *a, const cur
     if (!pieces && s->sun > 0.0) {
         set_slope(s, f);
     }
+    if (a->r->whole.count > 0) {
+        bst_resolved_note_light(a, s, true);
+    }
     if (a->r->whole.count > 0 && pieces && s->sun > 0.0) {
         BST_TRY(bst_resolved_clear_lit(ctx, a->r, f));
         BST_TRY(add_part_pieces(ctx, a, part, f, s->sun));

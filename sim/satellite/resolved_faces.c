@@ -68,6 +68,14 @@ bst_resolved_shading bst_resolved_shade(const bst_resolved_adding *a, int materi
     return f;
 }
 
+void bst_resolved_note_light(const bst_resolved_adding *a, const bst_resolved_shading *light,
+                             bool round) {
+    bst_resolved_image *m = &a->r->image;
+    double per_px = (light->sun + light->earth + light->uniform) / (m->cell_px * m->cell_px);
+    m->surface_light = fmax(m->surface_light, per_px);
+    m->curved_light = round ? fmax(m->curved_light, per_px) : m->curved_light;
+}
+
 /* Exchanges the views, so that the first is that of the other light. */
 static void swap_views(bst_satellite_pose *p) {
     bst_pose_view v = p->views[0];
@@ -267,11 +275,12 @@ static const double PART_RAD = 0.05;
  * a cylinder by twice that. */
 int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double angle, bst_vec3 at,
                        bool limb) {
-    double depth_m, error_px = BST_RESOLVED_CURVED_PX;
+    const bst_resolved_view *v = a->view;
+    double depth_m, error_px = v->curved_px > 0.0 ? v->curved_px : BST_RESOLVED_CURVED_PX;
     (void)bst_resolved_project(a, at, &depth_m);
     double radius_px = radius_m * a->per_m / depth_m * a->r->image.cell_px;
     if (limb) {
-        error_px = fmin(fmax(a->view->limb_px, BST_RESOLVED_LIMB_PX), error_px);
+        error_px = fmin(v->limb_px > 0.0 ? v->limb_px : BST_RESOLVED_LIMB_PX, error_px);
     }
     double step_px = sqrt(12.0 * radius_px * error_px);
     double parts = fmax(angle * radius_px / step_px, angle / PART_RAD);
@@ -308,6 +317,7 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
         middle = bst_vec3_axpy(middle, 1.0 / count, corner[i]);
     }
     bst_resolved_shading s = bst_resolved_shade(a, from->material, middle, normal);
+    bst_resolved_note_light(a, &s, around > 1);
     const double light[2] = {s.sun, s.earth};
     bool pieces = false;
     for (int view = 0; view < 2; view++) {

@@ -113,6 +113,12 @@ bool bst_resolved_make_face(const bst_resolved_adding *a, const bst_vec3 *corner
 bst_resolved_shading bst_resolved_shade(const bst_resolved_adding *a, int material, bst_vec3 point,
                                         bst_vec3 normal);
 
+/* Keeps the most light of surfaces for bst_resolved_image.
+ *
+ * Given:     round  the surface is curved or has a round border */
+void bst_resolved_note_light(const bst_resolved_adding *a, const bst_resolved_shading *light,
+                             bool round);
+
 /* Fraction of a facet that a light reaches; the pieces are in pose->clip if it is between 0 and 1.
  *
  * Given:     view  0: Sun; 1: earthlight */

@@ -10,8 +10,10 @@ typedef struct bst_resolved_view {
     bst_quat q_image_from_body;
     bst_vec3 origin_m; /* from the observer to the body's origin, image axes */
     double scale_rad;  /* angle of a px at the boresight */
-    double limb_px;    /* error of borders of curved surfaces that is allowed, px: from
-                          BST_RESOLVED_LIMB_PX to BST_RESOLVED_CURVED_PX; 0: the first */
+    double limb_px;    /* error of borders of curved surfaces that is allowed, px: at most
+                          curved_px; 0: BST_RESOLVED_LIMB_PX */
+    double curved_px;  /* the same between parts of curved surfaces, which is in proportion to the
+                          square of their size; 0: BST_RESOLVED_CURVED_PX */
 } bst_resolved_view;
 
 /* Light of a material, in any unit: from a solid angle of one steradian whose BRDF times cosine of
@@ -46,6 +48,9 @@ typedef struct bst_resolved_image {
     int x0, y0, width, height;
     bst_resolved_cell *cells;    /* [height][width] */
     bst_resolved_second *second; /* [height][width], after bst_resolved_end_light; else NULL */
+    /* most light of a surface in any pose, and of one that is curved or has a round border, per
+     * px^2, without the weight */
+    double surface_light, curved_light;
     int16_t *part; /* [height][width] part that covers most of the cell in the latest pose
                       added; -1: none */
 } bst_resolved_image;
@@ -55,7 +60,7 @@ typedef struct bst_resolved bst_resolved;
 
 /* Gaps and overlaps between parts of curved surfaces have up to half of that width, px. */
 #define BST_RESOLVED_CURVED_PX 2.5e-4
-/* Least error of their borders, px. */
+/* Error of their borders, px. */
 #define BST_RESOLVED_LIMB_PX 4e-5
 
 /* Largest number of cells. */

@@ -74,7 +74,7 @@ static double compare(bst_test_model *m, bst_vec3 eye, bst_vec3 sun, double scal
     bst_resolved_light light = {.sun = sun, .gain = gain};
     bst_vec3 to = bst_vec3_scale(bst_vec3_unit(eye), -1.0);
     bst_quat look = bst_quat_look(to, (bst_vec3){0.3, 0.8, 0.4});
-    bst_resolved_view view = {look, {0, 0, bst_vec3_norm(eye)}, scale_rad, 0.0};
+    bst_resolved_view view = {look, {0, 0, bst_vec3_norm(eye)}, scale_rad, 0.0, 0.0};
     double low[2], high[2], worst = 0.0, brightest = 0.0;
     assert_true(bst_resolved_box(m->pose, &view, low, high));
     for (int k = 0; k < 2; k++) {
@@ -142,6 +142,7 @@ static void test_grazing_shadow(void **state) {
         bst_quat_look(bst_vec3_scale(bst_vec3_unit(eye), -1.0), (bst_vec3){0, 0, 1}),
         {0, 0, bst_vec3_norm(eye)},
         0.0002,
+        0.0,
         0.0};
     double low[2], high[2], total;
     assert_true(bst_resolved_box(m.pose, &view, low, high));

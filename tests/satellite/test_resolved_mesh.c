@@ -128,6 +128,7 @@ static double compare_sides(bst_satellite *satellite, double left_out) {
         bst_resolved_view view = {bst_quat_look(bst_vec3_scale(from, -1.0), (bst_vec3){0, 0, 1}),
                                   {0, 0, 20.0},
                                   0.0025 + 0.001 * n,
+                                  0.0,
                                   0.0};
         bst_resolved *cuts = draw_within(pose, &view, &light, BY_CUTS, left_out);
         bst_resolved *areas = draw_within(pose, &view, &light, BY_AREAS, left_out);
@@ -203,6 +204,7 @@ static void test_border_across_border(void **state) {
             bst_quat_look(bst_vec3_scale(from, -1.0), (bst_vec3){0.1, 0.2, 0.97}),
             {0, 0, range_m},
             2.0 / 30.0 / 140.0,
+            0.0,
             0.0};
         bst_resolved *cuts = draw(pose, &view, &light, BY_CUTS);
         bst_resolved *areas = draw(pose, &view, &light, BY_AREAS);
@@ -266,8 +268,11 @@ static void test_plane_along_edges(void **state) {
     bst_satellite_pose *pose;
     bst_resolved_gain gain[1] = {{.sun = 1.0}};
     bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.3, -0.4, 1.0}), .gain = gain};
-    bst_resolved_view view = {
-        bst_quat_look((bst_vec3){0.05, 0.02, -1.0}, (bst_vec3){1, 0, 0}), {0, 0, 60.0}, 0.001, 0.0};
+    bst_resolved_view view = {bst_quat_look((bst_vec3){0.05, 0.02, -1.0}, (bst_vec3){1, 0, 0}),
+                              {0, 0, 60.0},
+                              0.001,
+                              0.0,
+                              0.0};
     bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
     bst_resolved *cuts = draw(pose, &view, &light, BY_CUTS);
     bst_resolved *areas = draw(pose, &view, &light, BY_AREAS);
@@ -430,7 +435,7 @@ static void test_faint_edges(void **state) {
     bst_resolved_gain gain[1] = {{.sun = 1.0}};
     bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.3, 0.2, 1.0}), .gain = gain};
     bst_resolved_view view = {
-        bst_quat_look((bst_vec3){0, 0, -1.0}, (bst_vec3){1, 0, 0}), {0, 0, 20.0}, 0.001, 0.0};
+        bst_quat_look((bst_vec3){0, 0, -1.0}, (bst_vec3){1, 0, 0}), {0, 0, 20.0}, 0.001, 0.0, 0.0};
     bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
     bst_resolved *all = draw(pose, &view, &light, BY_AREAS);
     bst_resolved *faint = draw(pose, &view, &light, BY_BLURRED_AREAS);

@@ -1,0 +1,166 @@
+#include "scenegen/smear/body_precision.h"
+
+#include <math.h>
+
+/* Shares of the tolerance for cells with a border, for curved surfaces, and for their borders; and
+ * for the poses of models with curved surfaces, without, and where many blur the image. Together
+ * with that of the nodes they are the whole. */
+#define CELL_SHARE 0.35
+#define CURVED_SHARE 0.12
+#define LIMB_SHARE 0.05
+#define CURVED_POSES_SHARE 0.12
+#define POSES_SHARE 0.4
+#define BLURRED_POSES_SHARE 0.6
+/* Light of the pixel with the largest error, over that of the body: the derivative of a border's
+ * image over the noise of its light has its extremum 0.75 where that is, with 0.24 of it at most.
+ */
+#define BORDER_LIGHT 0.1
+
+/* Error of the light of a surface that glints: see body_poses.c. */
+#define GLINT_ERROR 1e-4
+/* Error of the light of curved surfaces, over that light and the error of their parts in px:
+ * measured for satellites of scenarios/satellites, at most 2 where lobes are narrow. */
+#define CURVED_ERROR 1.5
+/* Share of the tolerance by the borders of stamps: of nodes in even light all add up. */
+#define STAMP_SHARE 0.08
+/* Error by cells in which borders of curved surfaces and shadows meet, over the light of a pixel
+ * and the side in px: 0.0005 for falcon_9_second_stage, 0.0008 for iss_like, with 10^4 electrons.
+ */
+#define CURVED_CELL 1e-3
+/* The same for a facet that turns into the light: a larger error asks for poses beside it. */
+#define KINK_SHARE 0.03
+/* Light of the brightest facet over the mean that is expected, at most. */
+#define BRIGHTER 4.0
+/* Least error of borders of curved surfaces and between their parts that is asked for, px. */
+#define LIMB_LEAST_PX 1e-5
+/* Motion of borders of shadows over that of the body, about. */
+#define FASTER 1.1
+/* Motion, PSF sigmas, from which borders fall on all parts of the cells. */
+#define BLURRED_SIGMAS 24.0
+/* Light of a pixel, over its noise in e-, up to which edges between facets of almost the same light
+ * may go without second moments: those of a cell are wrong by 0.0016 of the light at most, with
+ * both signs as the edge passes. */
+#define EVEN_SIGMAS 120.0
+
+/* Error by cells with a border, of which the second moments are right to some 0.02 of the square of
+ * the side, over the light of a pixel. */
+static double cell_error(const bst_smear *s, const bst_scene_source *source, double side_px) {
+    double sides = side_px / s->sigma_px;
+    double curved = source->body->satellite->curved_count > 0 ? CURVED_CELL * side_px : 0.0;
+    return sides * sides * sides / 240.0 + curved;
+}
+
+/* Noise of the pixel with the largest error beside a border of a surface. */
+static double border_noise_e(const bst_smear *s, double light_e) {
+    return sqrt(BORDER_LIGHT * light_e + s->dark_variance_e2);
+}
+
+/* A border that is moved by 1 px changes a pixel beside it by 0.4 / sigma of the light. */
+double bst_body_limb_px(const bst_smear *s, double light_e) {
+    double allowed_e = LIMB_SHARE * s->options.tolerance_sigma * border_noise_e(s, light_e);
+    return fmin(fmax(allowed_e * s->sigma_px / (0.4 * fmax(light_e, 1e-9)), LIMB_LEAST_PX),
+                BST_RESOLVED_CURVED_PX);
+}
+
+double bst_body_curved_px(const bst_smear *s, double curved_e) {
+    double allowed_e = CURVED_SHARE * s->options.tolerance_sigma * border_noise_e(s, curved_e);
+    return fmin(fmax(allowed_e / (CURVED_ERROR * fmax(curved_e, 1e-9)), LIMB_LEAST_PX),
+                BST_RESOLVED_CURVED_PX);
+}
+
+double bst_body_cell_px(const bst_body_image_plan *p, bool light_only, bool blurred) {
+    enum { FINEST = 32, ACROSS = 32, MOST_ACROSS = 4096 };
+    const bst_smear *s = p->s;
+    double across_px = 2.0 * bst_smear_radius_px(s, p->source);
+    /* errors of nodes of some poses have the same signs */
+    bool some = light_only && p->times.count > 1;
+    double side = light_only && blurred ? 1.0 : some ? 0.25 : 0.5;
+    double allowed_e = CELL_SHARE * s->options.tolerance_sigma * border_noise_e(s, p->light_e);
+    while (!light_only && !blurred && side > 1.0 / FINEST &&
+           cell_error(s, p->source, side) * p->light_e > allowed_e &&
+           across_px / side <= 0.5 * MOST_ACROSS) {
+        side *= 0.5;
+    }
+    while (side > across_px / ACROSS) {
+        side *= 0.5;
+    }
+    return side;
+}
+
+bool bst_body_even(const bst_body_image_plan *p) {
+    return p->light_e < EVEN_SIGMAS * sqrt(p->light_e + p->s->dark_variance_e2);
+}
+
+void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, bool *blurred) {
+    const bst_smear *s = p->s;
+    double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
+    double sigmas = (p->moved_px + FASTER * p->turned_px) / sigma_px;
+    double poses = fmax(0.5 * sigmas, 4.0),
+           missed_e = BRIGHTER * p->light_e / (8.0 * poses * poses);
+    double allowed_e = KINK_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
+    double least_rad = allowed_e / fmax(missed_e, 1e-9);
+    int kinks = least_rad < p->turn_rad
+                    ? bst_body_kinks_find(p->source, least_rad, pose, p->glints + p->glint_count)
+                    : 0;
+    *blurred = sigmas >= BLURRED_SIGMAS;
+    double share = *blurred ? BLURRED_POSES_SHARE : POSES_SHARE;
+    share = p->source->body->satellite->curved_count > 0 ? CURVED_POSES_SHARE : share;
+    const bst_body_times_aim aim = {.sigmas = sigmas,
+                                    .pose_e = fmax(p->pose_e, p->light_e),
+                                    .light_e = p->light_e,
+                                    .dark_variance_e2 = s->dark_variance_e2,
+                                    .allowed_sigma = share * s->options.tolerance_sigma,
+                                    .glints = p->glints,
+                                    .glint_count = p->glint_count + kinks};
+    bst_body_times_choose(&aim, &p->times);
+}
+
+/* Most light in a pixel of the image, electrons before the PSF. */
+static double peak_e(const bst_resolved_image *m, double electrons) {
+    int n = (int)fmax(round(1.0 / m->cell_px), 1.0);
+    double most = 0.0;
+    for (int j = 0; j < m->height; j += n) {
+        for (int i = 0; i < m->width; i += n) {
+            double sum = 0.0;
+            for (int k = 0; k < n * n; k++) {
+                int x = i + k % n, y = j + k / n;
+                sum += x < m->width && y < m->height
+                           ? (double)m->cells[(size_t)y * (size_t)m->width + (size_t)x].light
+                           : 0.0;
+            }
+            most = fmax(most, sum);
+        }
+    }
+    return electrons * most;
+}
+
+void bst_body_set_error(bst_body_image_plan *d, bst_smear_body *b, double *light_e,
+                        double *curved_e) {
+    const bst_smear *s = d->s;
+    const bst_resolved_image *m = bst_resolved_image_of(b->image);
+    double electrons = d->source->electrons_per_s * s->duration_s, weights = 0.0;
+    double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0), error = 0.0;
+    *light_e = peak_e(m, electrons);
+    for (int k = 0; k < d->times.count; k++) {
+        weights += d->times.weight[k];
+    }
+    *curved_e = fmin(m->curved_light * weights * electrons, *light_e);
+    /* of one pose, which its motion spreads */
+    double swept_px = 1.0 + d->moved_px + d->turned_px;
+    d->pose_e = m->surface_light * weights * electrons;
+    d->pose_e = fmax(fmin(d->pose_e, swept_px * *light_e), *light_e);
+    if (b->one_pose) {
+        error = d->turned_px * d->turned_px / 12.0 * 0.12 / (sigma_px * sigma_px);
+    }
+    if (!m->second && !b->blurred) {
+        error += cell_error(s, d->source, b->cell_px);
+    }
+    double limb = 0.4 * fmin(d->limb_px, d->curved_px) / sigma_px;
+    b->sigma = error * *light_e / border_noise_e(s, *light_e) +
+               (CURVED_ERROR * d->curved_px + limb) * *curved_e / border_noise_e(s, *curved_e) +
+               bst_body_times_sigma(&d->times, d->pose_e, *light_e, s->dark_variance_e2);
+    b->sigma += STAMP_SHARE * s->options.tolerance_sigma;
+    if (d->glint_count > 0) {
+        b->sigma += GLINT_ERROR * *light_e / sqrt(*light_e + s->dark_variance_e2);
+    }
+}

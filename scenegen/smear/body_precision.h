@@ -1,0 +1,49 @@
+/* How finely the image of a body is drawn, and its error. */
+#ifndef BST_SCENEGEN_SMEAR_BODY_PRECISION_H
+#define BST_SCENEGEN_SMEAR_BODY_PRECISION_H
+
+#include "scenegen/smear/body_glints.h"
+#include "scenegen/smear/smear_internal.h"
+
+/* What the poses of an image have in common. */
+typedef struct bst_body_image_plan {
+    const bst_smear *s;
+    const bst_scene_source *source;
+    bst_body_times times;                 /* weights with the factors on the light */
+    double moved_px, turn_rad, turned_px; /* motion in the exposure */
+    bst_glint glints[BST_BODY_GLINTS_MAX + BST_BODY_KINKS_MAX];
+    int glint_count;           /* without those of kinks, which follow */
+    double light_e;            /* in a pixel, for which the image is drawn */
+    double pose_e;             /* the same of a pose without motion; 0: not known yet */
+    double curved_px, limb_px; /* see bst_resolved_view */
+} bst_body_image_plan;
+
+/* Error of borders of curved surfaces, px, for light_e. */
+double bst_body_limb_px(const bst_smear *s, double light_e);
+
+/* Error between parts of curved surfaces, px, for light of curved_e electrons in a pixel. */
+double bst_body_curved_px(const bst_smear *s, double curved_e);
+
+/* Side of the cells for the body, px: a power of two of pixels, or less for small bodies.
+ *
+ * Given:     light_only  see bst_resolved_add_light: all second moments of cells are known
+ *            blurred     borders fall on all parts of the cells */
+double bst_body_cell_px(const bst_body_image_plan *plan, bool light_only, bool blurred);
+
+/* Chooses the poses of a body that turns, in plan->times.
+ *
+ * Returned:  *blurred  borders fall on all parts of the cells */
+void bst_body_choose_poses(bst_body_image_plan *plan, bst_satellite_pose *pose, bool *blurred);
+
+/* True if edges between facets of almost the same light may go without second moments. */
+bool bst_body_even(const bst_body_image_plan *plan);
+
+/* Sets the error of an image but for its nodes, in body->sigma, and plan->pose_e, by the light that
+ * it has.
+ *
+ * Returned:  *light_e   most light in a pixel
+ *            *curved_e  the same of surfaces that are curved or have round borders */
+void bst_body_set_error(bst_body_image_plan *plan, bst_smear_body *body, double *light_e,
+                        double *curved_e);
+
+#endif
