@@ -153,7 +153,7 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
                        bst_report_warnings *w) {
     static const struct {
         const char *sql;
-        int severity; /* bst_run_severity, or -1: no warning */
+        bst_run_severity severity;
         const char *text;
     } checks[] = {
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND"
@@ -187,7 +187,7 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
 static void add_events(const bst_run_reader *run, bst_report_warnings *w) {
     static const struct {
         const char *kind;
-        bst_run_severity severity;
+        int severity; /* bst_run_severity, or -1: no warning */
         const char *text;
     } known[] = {
         {"mode", -1, ""}, /* the charts show it */
