@@ -74,8 +74,11 @@ int bst_body_glints_find(const bst_scene_source *source, const bst_body_glint_li
     if (list->count == 0) {
         return 0;
     }
-    int count = bst_glint_find(list->items, list->count, half_sun_rad, steps, glint_offsets,
-                               &course, glints, BST_BODY_GLINTS_MAX);
+    bst_glint all[BST_GLINTS_MAX];
+    int count =
+        bst_glint_find(list->items, list->count, half_sun_rad, steps, glint_offsets, &course, all);
+    count = count < BST_BODY_GLINTS_MAX ? count : BST_BODY_GLINTS_MAX;
+    memcpy(glints, all, (size_t)count * sizeof *glints);
     return add_ends(&course, half_sun_rad, glints, count);
 }
 

@@ -2,7 +2,6 @@
 #ifndef BST_SCENEGEN_SMEAR_BODY_GLINTS_H
 #define BST_SCENEGEN_SMEAR_BODY_GLINTS_H
 
-#include "sim/satellite/glint.h"
 #include "sim/world/scene/source_body.h"
 
 /* Glints of an exposure, and times at which a facet turns into the light or the view, at most. */

@@ -3,7 +3,6 @@
 #define BST_SCENEGEN_SMEAR_BODY_POSES_H
 
 #include "sim/core/parallel.h"
-#include "sim/satellite/glint.h"
 #include "sim/world/scene/source_body.h"
 
 enum { BST_BODY_POSES_MAX = 1024 };

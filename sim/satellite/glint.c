@@ -73,7 +73,7 @@ typedef struct search {
     bst_glint_course course;
     void *user;
     bst_glint *glints;
-    int most, count;
+    int count;
 } search;
 
 static double offset_at(const search *s, int surface, double u) {
@@ -107,10 +107,10 @@ static double least_between(const search *s, int surface, double low, double hig
 }
 
 int bst_glint_find(const bst_glint_surface *surfaces, int count, double widen_rad, int steps,
-                   bst_glint_course course, void *user, bst_glint *glints, int most) {
+                   bst_glint_course course, void *user, bst_glint glints[BST_GLINTS_MAX]) {
     assert(count >= 0 && count <= BST_GLINT_SURFACES && steps >= 2 && course && glints);
     double before[BST_GLINT_SURFACES], here[BST_GLINT_SURFACES], after[BST_GLINT_SURFACES];
-    search s = {course, user, glints, most, 0};
+    search s = {course, user, glints, 0};
     double step = 1.0 / steps;
     course(user, -step, before);
     course(user, 0.0, here);
@@ -129,7 +129,7 @@ int bst_glint_find(const bst_glint_surface *surfaces, int count, double widen_ra
             }
             double at = least_between(&s, i, u - step, u + step, &least);
             double fall = fmax(before[i], after[i]) - least;
-            if (least < REACH * lobe && fall > 0.2 * lobe && s.count < most) {
+            if (least < REACH * lobe && fall > 0.2 * lobe && s.count < BST_GLINTS_MAX) {
                 s.glints[s.count++] = (bst_glint){at, step * lobe / fall};
             }
         }
@@ -144,10 +144,11 @@ int bst_glint_find(const bst_glint_surface *surfaces, int count, double widen_ra
 int bst_glint_times(const bst_glint_surface *surfaces, int count, double widen_rad, int steps,
                     bst_glint_course course, void *user, double *times, int most) {
     static const double parts[] = {0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0, -4.0, 4.0};
-    enum { PARTS = sizeof parts / sizeof parts[0], MOST = 256 };
-    bst_glint glints[MOST];
-    int times_count = 0, room = most / PARTS < MOST ? most / PARTS : MOST;
-    int found = bst_glint_find(surfaces, count, widen_rad, steps, course, user, glints, room);
+    enum { PARTS = sizeof parts / sizeof parts[0] };
+    bst_glint glints[BST_GLINTS_MAX];
+    int times_count = 0,
+        found = bst_glint_find(surfaces, count, widen_rad, steps, course, user, glints);
+    found = found < most / PARTS ? found : most / PARTS;
     for (int i = 0; i < found * PARTS; i++) {
         double at = glints[i / PARTS].u + parts[i % PARTS] * glints[i / PARTS].per;
         if (at > 0.0 && at < 1.0) {

@@ -6,7 +6,7 @@
 
 /* Surfaces for which glints are sought, at most, and the widest lobe that counts as a glint, rad.
  */
-enum { BST_GLINT_SURFACES = 256 };
+enum { BST_GLINT_SURFACES = 256, BST_GLINTS_MAX = 256 };
 #define BST_GLINT_WIDEST_RAD 0.3
 
 /* Facets with the same normal, or a cylinder or cone, whose normals make one angle with its axis.
@@ -49,11 +49,10 @@ typedef void (*bst_glint_course)(void *user, double u, double *offsets);
  *            widen_rad  added to each lobe: what the Sun's disc adds
  *            steps      of the first scan; offsets may have one minimum in two steps
  *            course     offsets of all surfaces at a time
- *            most       room in `glints`
  * Returned:  glints     u may be up to a step outside of [0, 1]
- * Value:     their number; glints without room are left out, the latest first */
+ * Value:     their number; more than BST_GLINTS_MAX are left out, the latest first */
 int bst_glint_find(const bst_glint_surface *surfaces, int count, double widen_rad, int steps,
-                   bst_glint_course course, void *user, bst_glint *glints, int most);
+                   bst_glint_course course, void *user, bst_glint glints[BST_GLINTS_MAX]);
 
 /* Finds the times around which a light curve must be sampled densely: those of bst_glint_find, and
  * times at fractions of the lobe's width around them.

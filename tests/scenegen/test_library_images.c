@@ -115,7 +115,7 @@ static view view_of(int n) {
 }
 
 /* Renders a view at the tolerance and finer. *ratio: predicted error over that found. Value: false
- * if the promise is broken. */
+ * if the error exceeds its prediction, or that the tolerance. */
 static bool judge(fixture *f, const bst_satellite *satellite, const char *name, int n,
                   double *ratio) {
     static float image[2][SIDE_MAX * SIDE_MAX];
