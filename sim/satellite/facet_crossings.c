@@ -170,11 +170,32 @@ static bool share_a_line(const bst_facet_net *net, int f, int g) {
     return fmin(of_f[1], of_g[1]) - fmax(of_f[0], of_g[0]) > SAME * net->satellite->radius_m;
 }
 
-/* True if two facets may cross, or lie in one plane. */
+/* True if a side of a facet separates it from another one in its plane. */
+static bool is_beside(const bst_facet_net *net, int f, int g) {
+    double same = SAME * net->satellite->radius_m;
+    int first = net->first[f], end = net->first[f + 1];
+    bst_vec3 a = corner_of(net, end - 1);
+    for (int i = first; i < end; i++) {
+        bst_vec3 b = corner_of(net, i);
+        bst_vec3 out = bst_vec3_cross(bst_vec3_sub(b, a), net->satellite->facets[f].normal);
+        double length = bst_vec3_norm(out), least = -same * length;
+        bool outside = length > same;
+        for (int k = net->first[g]; k < net->first[g + 1] && outside; k++) {
+            outside = bst_vec3_dot(out, bst_vec3_sub(corner_of(net, k), a)) >= least;
+        }
+        if (outside) {
+            return true;
+        }
+        a = b;
+    }
+    return false;
+}
+
+/* True if two facets may cross, or overlap in one plane. */
 static bool may_cross(const bst_facet_net *net, int f, int g) {
     side of_g = side_of(net, f, g);
     if (of_g != ON_BOTH_SIDES) {
-        return of_g == IN_THE_PLANE;
+        return of_g == IN_THE_PLANE && !is_beside(net, f, g) && !is_beside(net, g, f);
     }
     return side_of(net, g, f) == ON_BOTH_SIDES && share_a_line(net, f, g);
 }

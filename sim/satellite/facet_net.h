@@ -24,8 +24,8 @@ typedef struct bst_facet_net {
     int *beside; /* by corner: facet on the other side of the edge to the next corner, if no third
                     one has that edge; else the number of facets */
     bst_net_edge *edges;
-    uint8_t *apart; /* by facet, in any pose: BST_NET_APART: no other one crosses it or lies in its
-                       plane beside it; BST_NET_FREE: nor has one of its sides, but those of both */
+    uint8_t *apart; /* by facet, in any pose: BST_NET_APART: no other one crosses it or overlaps it
+                       in its plane; BST_NET_FREE: nor has one of its sides, but those of both */
     int vertex_count, edge_count;
 } bst_facet_net;
 

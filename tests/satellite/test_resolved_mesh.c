@@ -285,6 +285,34 @@ static void test_plane_along_edges(void **state) {
     bst_satellite_free(satellite);
 }
 
+/* Writes two blocks, one beside the other, whose sides are TILES x TILES squares of two triangles
+ * in one plane. */
+static void write_tiles(FILE *f) {
+    enum { TILES = 6, ROW = TILES + 1, SIDE = ROW * ROW };
+    for (int n = 0; n < 12 * SIDE; n++) {
+        int side = n / SIDE % 6, axis = side / 2, sign = side % 2 ? -1 : 1;
+        double at[3], u = 2.0 * (n % ROW) / TILES - 1.0, v = 2.0 * (n % SIDE / ROW) / TILES - 1.0;
+        at[axis] = sign;
+        at[(axis + 1) % 3] = sign * u;
+        at[(axis + 2) % 3] = v;
+        double off = n < 6 * SIDE ? 0.0 : 2.3;
+        fprintf(f, "v %.9f %.9f %.9f\n", at[0] + off, 0.4 * at[1] - 0.3 * off, at[2] + 0.4 * off);
+    }
+    for (int n = 0; n < 12 * TILES * TILES; n++) {
+        int low = n / (TILES * TILES) * SIDE + n / TILES % TILES * ROW + n % TILES + 1;
+        fprintf(f, "f %d %d %d\nf %d %d %d\n", low, low + 1, low + ROW + 1, low, low + ROW + 1,
+                low + ROW);
+    }
+}
+
+/* Facets in one plane do not hide each other, and hide and shade those of the other block. */
+static void test_tiles(void **state) {
+    (void)state;
+    bst_satellite *satellite = load_mesh(write_tiles);
+    bst_assert_close(compare_sides(satellite, 0.0), 0.0, 1e-5); /* exact; see test_bumps */
+    bst_satellite_free(satellite);
+}
+
 /* Two facets: the corners of each, m, and what the first one is to the second one. */
 typedef struct two_facets {
     int count[2];
@@ -372,6 +400,17 @@ static void test_crossing_facets(void **state) {
         {{3, 3},
          {{1, 0, 0}, {2, 0, -1}, {2, 0, 1}, {0, 0, 0}, {-1, 1, 0}, {-1, -1, 0}},
          BST_NET_FREE},
+        /* in one plane: halves of a square, beside each other with a common corner or a part of a
+         * side, and over each other */
+        {{3, 3}, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 0, 0}, {1, 1, 0}, {0, 1, 0}}, BST_NET_FREE},
+        {{3, 3},
+         {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 0, 0}, {-1, 1, 0}, {-1, 0, 0}},
+         BST_NET_APART},
+        {{3, 3},
+         {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {1, 0, 0}, {1, -1, 0}, {3, 0, 0}},
+         BST_NET_APART},
+        {{3, 3}, {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {1, 0, 0}, {3, 0, 0}, {1, 2, 0}}, 0},
+        {{3, 3}, {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {1, 0, 0}, {1, 2, 0}, {3, 0, 0}}, 0},
         /* a panel on a panel */
         {{3, 3},
          {{0, 0, 0}, {2, 0, 0}, {2, 0, 1}, {3, 3, 0}, {-3, 3, 0}, {-3, -3, 0}},
@@ -461,6 +500,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_bumps),
                                        cmocka_unit_test(test_facets_through_others),
                                        cmocka_unit_test(test_plane_along_edges),
+                                       cmocka_unit_test(test_tiles),
                                        cmocka_unit_test(test_beside_the_image),
                                        cmocka_unit_test(test_border_across_border),
                                        cmocka_unit_test(test_crossing_facets),
