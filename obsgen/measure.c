@@ -149,7 +149,7 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double sharp = s->sharp * bst_crlb_table_norm(bound, s->length) / truth->norm;
     /* Saturated pixels are left out of the fit, whose covariance is that of the others: in images
      * three stars of SNR 79,000 to 161,000 have errors of 1.6 to 2.0 times the bound. */
-    const double left_out = s->saturated ? 2.0 : 1.0;
+    const double left_out = s->saturated && !b->drawn ? 2.0 : 1.0;
     double worse = left_out / fmin(sharp, 1.0);
     double open = b->drawn ? 0.0 : worse;
     /* `sharp` has the lower SNR of a shape already */

@@ -403,7 +403,7 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
             return BST_OK;
         }
         t->holder[s->task.object] = -1;
-        BST_TRY(bst_tasking_take_track(ctx, t, sensor));
+        bst_tasking_take_track(t, sensor);
         if (before != BST_TASK_DONE) {
             *not_before(t, sensor, s->task.object) = (float)(now_s + t->config.retry_s);
         }

@@ -34,7 +34,7 @@ void bst_tasking_uncertainty_update(bst_tasking *tasking, int object, double see
                                     double information_m2);
 /* Updates the object of a sensor's task, which ends, with its last track. Errors: those of the
  * onboard knowledge */
-bst_status bst_tasking_take_track(bst_ctx *ctx, bst_tasking *tasking, int sensor) BST_MUST_CHECK;
+void bst_tasking_take_track(bst_tasking *tasking, int sensor);
 /* Sets the sensor's pixel noise and noise-equivalent area. */
 void bst_tasking_noise(bst_tasking_sensor *sensor);
 

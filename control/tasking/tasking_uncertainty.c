@@ -84,19 +84,23 @@ static bst_status place_at(bst_ctx *ctx, const bst_tasking_sensor *s, int object
     return BST_OK;
 }
 
-bst_status bst_tasking_take_track(bst_ctx *ctx, bst_tasking *t, int sensor) {
+void bst_tasking_take_track(bst_tasking *t, int sensor) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
     bst_vec3 place[2];
-    bst_world_sight sight, next;
+    bst_world_sight sight, before;
     assert(s->task.object >= 0);
     if (s->frames == 0) {
-        return BST_OK;
+        return;
     }
-    BST_TRY(place_at(ctx, s, s->task.object, s->last_seen_s, &place[0], &sight));
-    BST_TRY(place_at(ctx, s, s->task.object, s->last_seen_s + STEP_S, &place[1], &next));
+    /* an orbit that ends has no place afterwards; the last sighting then updates nothing */
+    bst_ctx quiet = {0};
+    if (place_at(&quiet, s, s->task.object, s->last_seen_s, &place[1], &sight) != BST_OK ||
+        place_at(&quiet, s, s->task.object, s->last_seen_s - STEP_S, &place[0], &before) !=
+            BST_OK) {
+        return;
+    }
     bst_tasking_uncertainty_update(
         t, s->task.object, s->last_seen_s,
         bst_tasking_information_m2(s->seen_direction, sight.range_m,
                                    bst_vec3_sub(place[1], place[0]), s->seen_covariance));
-    return BST_OK;
 }

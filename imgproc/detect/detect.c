@@ -424,7 +424,9 @@ static void locate_candidates(bst_imgproc *ip, const part *p, bst_detections *ou
     }
     int kept = 0, room = capacity - out->count;
     room = room < ip->locator.capacity ? room : ip->locator.capacity;
-    int lost = ip->candidates.count - ip->locator.count;
+    /* of the candidates those beyond the capacity; a candidate may become two sources */
+    const int beyond = ip->candidates.count - ip->locator.capacity;
+    int lost = beyond > 0 ? beyond : 0;
     if (p->search) {
         bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, p->false_alarms, &ip->locator);
     }

@@ -344,7 +344,8 @@ static bool is_of(const int quad[4], int i) {
 
 /* Weighs a match of predicted stars: the likelihood of the detections if the attitude is right,
  * over that if they are spread evenly. A star is in the ellipse of a detection with its probability
- * of being detected, or by chance. The quad's own detections do not count.
+ * of being detected, or by chance. The quad's own detections do not count, nor do stars that are
+ * as probable by chance.
  *
  * Returned:  out->predicted, matched  those up to the frame's limit
  *            logarithm of the ratio. By the null model its mean is 1, so that it exceeds R with a
@@ -360,14 +361,16 @@ static double log_ratio(const attempt *a, const int quad[4], int predicted, int 
     const double chance = fmax(bst_null_model_chance(area_px2, a->area_px2), LEAST_CHANCE);
     for (int k = 0; k < predicted; k++) {
         out->predicted += s->found_share[k] >= SURELY_FOUND;
-        sum += log((1.0 - s->found_share[k]) / (1.0 - chance));
+        sum += s->found_share[k] > chance ? log((1.0 - s->found_share[k]) / (1.0 - chance)) : 0.0;
     }
     for (int i = 0; i < sources; i++) {
         if (s->star_of[i] >= 0) {
             double share = s->found_share[s->star_of[i]];
-            double missed = log((1.0 - share) / (1.0 - chance));
             out->matched += share >= SURELY_FOUND;
-            sum += (is_of(quad, i) ? 0.0 : log(share / chance)) - missed;
+            if (share > chance) {
+                double missed = log((1.0 - share) / (1.0 - chance));
+                sum += (is_of(quad, i) ? 0.0 : log(share / chance)) - missed;
+            }
         }
     }
     return sum;
@@ -389,7 +392,7 @@ static bst_status verify(const attempt *a, bst_star_fit fit, const int quad[4], 
         if (pass == 0 || pass == PASSES - 1) {
             out->least_log_chance = fmin(out->least_log_chance, log(out->candidates) - evidence);
         }
-        if (matched < 5 || (pass == 0 && evidence < LEAST_FIRST)) {
+        if (matched < 5 || (pass == 0 && !(evidence >= LEAST_FIRST))) {
             return BST_OK;
         }
         if (!bst_star_fit_refine(a->s->camera, a->s->matched, matched, &fit)) {
@@ -399,7 +402,7 @@ static bst_status verify(const attempt *a, bst_star_fit fit, const int quad[4], 
         tolerance = pass + 2 < PASSES ? fmax(LAST_PX, 0.5 * tolerance) : LAST_PX;
     }
     if (out->matched < LEAST_SHARE * out->predicted ||
-        log(out->candidates) - evidence > log(a->options->false_rate) ||
+        !(log(out->candidates) - evidence <= log(a->options->false_rate)) ||
         fabs(fit.scale - 1.0) > a->options->scale_tolerance + SCALE_MARGIN) {
         return BST_OK;
     }

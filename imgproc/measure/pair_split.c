@@ -20,11 +20,11 @@ static const double NEAR_FWHM = 1.0, ELSEWHERE = 5.5, ON_PATH = 1.4;
  * ratio of exp(2) = 7, a design choice. Fainter ones cannot be separated
  * (tests/imgproc/pair_resolution.c, `moving`). */
 static const double STREAK_LEAD = 4.0;
-/* Least number of bright sources whose median width is preferred to that of the known PSF, and the
- * most of which it is taken: design choices. */
-/* SNR of those: well above the one from which widths are fitted (imgproc/measure/locate.c), which
- * selects by the peak and so the narrower ones. */
+/* SNR of the sources of which widths are taken: well above the one from which they are fitted
+ * (imgproc/measure/locate.c), which selects by the peak and so the narrower ones. */
 static const double WIDTH_SNR = 25.0;
+/* Least number of them whose median is preferred to the width of the known PSF, and the most of
+ * which it is taken: design choices. */
 enum { LEAST_WIDTHS = 5, MOST_WIDTHS = 255 };
 
 /* Coefficients of the second derivatives (xx, xy, yy) of the single source's image in its

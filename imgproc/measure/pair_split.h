@@ -15,7 +15,8 @@ typedef struct bst_pair {
  *
  * Given:     least_gain  a pair whose gain is surely below is not fitted
  * Returned:  false: the source has neighbours, is cut off, or holds charge or full pixels; it shows
- * no elongation; the fit fails; or a streak explains it as well Notes:     the elongation is the
+ * no elongation; the fit fails; or a streak explains it clearly better
+ * Notes:     the elongation is the
  * coefficient of the PSF's second derivatives in the residuals of the single source (a pair of
  * shares a and 1 - a at the distance d has a (1 - a) d d^T), which is also the start of the fit, at
  * three ratios of brightness */

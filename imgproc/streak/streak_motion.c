@@ -28,7 +28,7 @@ typedef struct bst_streak_motion_star {
     bst_imgproc_shape shape;
     bst_imgproc_stamp stamp;
     double flux_e, product_e; /* flux; flux times widening */
-    double start_x, start_y, noise_e;
+    double start_x, start_y, noise_e, excess;
     double origin_x_px, origin_y_px; /* origin of the star's frame or window */
     /* step of the star's own parameters at fixed motion, and its change per step of the motion */
     double step[1 + COMMON][LOCAL];
@@ -118,6 +118,7 @@ static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
                   .origin_x_px = f->origin_x_px,
                   .origin_y_px = f->origin_y_px};
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
+    out->excess = f->excess;
     out->flux_e = snr * out->noise_e / f->filter->streak_norm;
     bst_imgproc_source source = {.shape = out->shape};
     out->stamp = bst_fit_stamp(&source, stamp_margin(f), work->max_side, f->width, f->height);
@@ -171,14 +172,16 @@ static bool accumulate_star(const bst_streak_motion *work, const bst_imgproc_gau
            2 * (size_t)n * sizeof *s->pixels);
     float sums[SUMS * BST_LANES];
     BST_SIMD_PICK(sum_star)
-    (work->planes, n, (float)s->flux_e, (float)s->product_e, (float)(s->noise_e * s->noise_e),
-     sums);
+    (work->planes, n, (float)s->flux_e, (float)s->product_e,
+     (float)(s->noise_e * s->noise_e / s->excess), sums);
+    /* the kernel weighs by 1 / (noise2 + light): excess times the weight */
+    const double scale = 1.0 / s->excess;
     double a[LOCAL][LOCAL] = {{0}}, right[1 + COMMON][LOCAL] = {{0}};
     double common[COMMON][COMMON] = {{0}}, g[COMMON] = {0};
     const float *at = sums;
     for (int p = 0; p < ALL; p++) {
         for (int q = 0; q <= p; q++, at += BST_LANES) {
-            double v = bst_simd_layout_sum(at);
+            double v = scale * bst_simd_layout_sum(at);
             if (p < LOCAL) {
                 a[p][q] = v;
             } else if (q < LOCAL) {
@@ -187,7 +190,7 @@ static bool accumulate_star(const bst_streak_motion *work, const bst_imgproc_gau
                 common[p - LOCAL][q - LOCAL] = v;
             }
         }
-        *(p < LOCAL ? &right[0][p] : &g[p - LOCAL]) = bst_simd_layout_sum(at);
+        *(p < LOCAL ? &right[0][p] : &g[p - LOCAL]) = scale * bst_simd_layout_sum(at);
         at += BST_LANES;
     }
     for (int r = 0; r <= COMMON; r++) {

@@ -10,7 +10,7 @@
 enum { MOST_STARS = 12 };
 static const double LEAST_SNR = 20.0, LEAST_PATH_SIGMAS = 4.0, MOST_BEND = 0.1;
 /* Errors of the telemetry that image processing expects, 1 sigma: of length and direction, px; of
- * the bend, share of the jitter (imgproc/detect/detect.c). */
+ * the bend, share of the jitter (imgproc/detect/camera_motion_left.c). */
 static const double DRIFT_PX = 1.0, JITTER_BEND = 0.075;
 /* Random stream of the bend's error. */
 static const uint64_t BEND_ERROR = (uint64_t)1 << 55;

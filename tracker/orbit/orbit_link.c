@@ -80,7 +80,7 @@ int bst_od_link_arc(bst_od_linker *l, const bst_od_motion *motion,
         for (int i = 0; i < l->count; i++) {
             const bst_od_linked *item = &l->items[i];
             const double last_s = item->directions[item->count - 1].observer.time_s;
-            bst_od_linked now;
+            bst_od_linked now = {.arcs = 0}; /* all bytes are in a saved state */
             if ((item->arcs == 1) == (waiting == 1) &&
                 directions[0].observer.time_s - last_s <= within_s &&
                 fits(item, motion, directions, count, &now) &&

@@ -24,10 +24,10 @@ typedef struct bst_od_linker {
 } bst_od_linker;
 
 /* Adds an arc to the orbit that it fits, or links it with an earlier arc to a new orbit; else it
- * waits. Of several the one with the least chi-square is taken. An arc fits if batch least squares
- * over all directions (bst_od_determine for two arcs, bst_od_fit from the orbit for more) leaves a
- * chi-square within five standard deviations of its expectation. When there is no room, the oldest
- * arc that waits is given up, and without one the oldest orbit.
+ * waits. Of several the one with the least chi-square less twice its directions is taken. An arc
+ * fits if batch least squares over all directions (bst_od_determine for two arcs, bst_od_fit from
+ * the orbit for more) leaves a chi-square within five standard deviations of its expectation. When
+ * there is no room, the oldest arc that waits is given up, and without one the oldest orbit.
  *
  * Given:     motion      SGP4 or forces; central motion alone fits no arcs that are hours apart
  *            directions  at least 3, in order of time
