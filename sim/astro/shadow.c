@@ -125,7 +125,7 @@ bool bst_earth_far_from_shadow(bst_vec3 position_m, bst_vec3 to_sun, double sun_
     }
     double across2 = bst_vec3_dot(position_m, position_m) - along * along;
     /* half-angle of the cones: the Sun's radius and the Earth's over the distance, and margins of a
-     * tenth, and of 0.1 % of the Earth's radius; 0.996 is more than its flattening takes away */
+     * tenth, and of 0.1 % of the Earth's radius; 0.995 is more than its flattening takes away */
     double cone = 1.1 * BST_SUN_RADIUS_M / sun_distance_m * along;
     double outer = 1.001 * (BST_EARTH_RADIUS_M + height_m) + cone;
     double inner = 0.995 * BST_EARTH_RADIUS_M - cone;

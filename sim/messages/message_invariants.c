@@ -118,7 +118,8 @@ bool bst_detections_are_valid(const bst_detections *d, int capacity) {
                  is_attitude(d->q_cam_from_gcrf) && is_attitude(d->q_telemetry_from_gcrf) &&
                  d->stars_identified >= 0 && d->windows >= 0 && d->bad_pixels >= 0 &&
                  bst_is_variance(d->shared_xx) && bst_is_variance(d->shared_yy) &&
-                 isfinite(d->shared_xy) && is_calibration(&d->calibration);
+                 fabs(d->shared_xy) <= (1.0 + 1e-12) * sqrt(d->shared_xx * d->shared_yy) &&
+                 is_calibration(&d->calibration);
     for (int i = 0; valid && i < d->count; i++) {
         valid = is_detection(&d->items[i]);
     }

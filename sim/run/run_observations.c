@@ -93,23 +93,24 @@ bst_status bst_run_scene_find(bst_ctx *ctx, const bst_run_scene *scene,
                     sensor->observer, sensor->name);
 }
 
-static const char query[] =
-    "SELECT t.track_id, t.tick, t.target_of_interest, t.ra_deg, t.dec_deg, t.v_mag, t.snr,"
-    " t.cov_d1_d1_rad2, t.cov_d1_d2_rad2, t.cov_d2_d2_rad2, f.attitude_valid,"
-    " f.attitude_q_cam_from_gcrf_x, f.attitude_q_cam_from_gcrf_y, f.attitude_q_cam_from_gcrf_z,"
-    " f.attitude_q_cam_from_gcrf_w, f.attitude_sigma_x_arcsec, f.attitude_sigma_y_arcsec,"
-    " f.attitude_sigma_z_arcsec, f.attitude_correlation_xy, f.attitude_correlation_xz,"
-    " f.attitude_correlation_yz, f.attitude_shared, t.x_px, t.y_px, d.cov_xx_px2, d.cov_xy_px2, "
-    "d.cov_yy_px2,"
-    " g.end_tick - g.start_tick"
-    " FROM tracks t JOIN track_frames f ON f.sensor = t.sensor AND f.exposure_id = t.exposure_id"
-    " LEFT JOIN detections d ON d.sensor = t.sensor AND d.exposure_id = t.exposure_id"
-    " AND d.x_px = t.x_px AND d.y_px = t.y_px"
-    " LEFT JOIN detection_frames g ON g.sensor = t.sensor AND g.exposure_id = t.exposure_id"
-    " WHERE t.sensor = ?1 AND t.misses_in_row = 0 AND (?2 = 0 OR t.track_id = ?2)"
-    " AND t.track_id IN (SELECT track_id FROM tracks WHERE sensor = ?1"
-    " AND (status = 'confirmed' OR target_of_interest = 1))"
-    " ORDER BY t.track_id, t.tick";
+#define CORRELATIONS \
+    " f.attitude_correlation_xy, f.attitude_correlation_xz, f.attitude_correlation_yz,"
+#define QUERY(correlations)                                                                       \
+    "SELECT t.track_id, t.tick, t.target_of_interest, t.ra_deg, t.dec_deg, t.v_mag, t.snr,"       \
+    " t.cov_d1_d1_rad2, t.cov_d1_d2_rad2, t.cov_d2_d2_rad2, f.attitude_valid,"                    \
+    " f.attitude_q_cam_from_gcrf_x, f.attitude_q_cam_from_gcrf_y, f.attitude_q_cam_from_gcrf_z,"  \
+    " f.attitude_q_cam_from_gcrf_w, f.attitude_sigma_x_arcsec, f.attitude_sigma_y_arcsec,"        \
+    " f.attitude_sigma_z_arcsec," correlations                                                    \
+    " f.attitude_shared, t.x_px, t.y_px,"                                                         \
+    " d.cov_xx_px2, d.cov_xy_px2, d.cov_yy_px2, g.end_tick - g.start_tick"                        \
+    " FROM tracks t JOIN track_frames f ON f.sensor = t.sensor AND f.exposure_id = t.exposure_id" \
+    " LEFT JOIN detections d ON d.sensor = t.sensor AND d.exposure_id = t.exposure_id"            \
+    " AND d.x_px = t.x_px AND d.y_px = t.y_px"                                                    \
+    " LEFT JOIN detection_frames g ON g.sensor = t.sensor AND g.exposure_id = t.exposure_id"      \
+    " WHERE t.sensor = ?1 AND t.misses_in_row = 0 AND (?2 = 0 OR t.track_id = ?2)"                \
+    " AND t.track_id IN (SELECT track_id FROM tracks WHERE sensor = ?1"                           \
+    " AND (status = 'confirmed' OR target_of_interest = 1))"                                      \
+    " ORDER BY t.track_id, t.tick"
 
 enum {
     ID,
@@ -249,7 +250,13 @@ bst_status bst_run_observations(bst_ctx *ctx, bst_run_scene *scene, const bst_ru
     bst_io_rows *rows;
     bool more;
     BST_TRY(bst_run_scene_find(ctx, scene, sensor, &g.observer, &g.sensor_index));
-    BST_TRY(bst_io_rows_open(ctx, scene->run, query, sensor->index, id, &rows));
+    /* runs recorded before the attitude had correlations */
+    const bool correlated = bst_run_reader_int(scene->run,
+                                               "SELECT 1 FROM pragma_table_info('track_frames')"
+                                               " WHERE name = 'attitude_correlation_xy'",
+                                               0, 0) == 1;
+    BST_TRY(bst_io_rows_open(ctx, scene->run, correlated ? QUERY(CORRELATIONS) : QUERY(" 0, 0, 0,"),
+                             sensor->index, id, &rows));
     bst_status status =
         bst_knowledge_create(ctx, scene->world, g.observer, g.sensor_index, &knowledge);
     g.camera = status == BST_OK ? bst_knowledge_camera(knowledge) : NULL;

@@ -49,7 +49,7 @@ typedef struct cone_pass {
 } cone_pass;
 
 /* Distance of n objects from the surface of the cone, minus their uncertainty. Behind the apex it
- * is an upper limit. */
+ * is a lower limit. */
 BST_CLONES_256 static void distances(const bst_ephemeris_rows *rows, int begin, int n,
                                      const cone_pass *cone, float *outside_m) {
     const float *px = rows->near_m[0] + begin, *py = rows->near_m[1] + begin,
