@@ -342,6 +342,9 @@ static bst_status detections_of(bst_ctx *ctx, bst_imgproc_state *m, bst_imgproc_
     out->background_e = l->made->background_e;
     out->noise_e = l->made->noise_e;
     out->threshold_snr = l->made->threshold_snr;
+    out->shared_xx = l->made->shared_xx;
+    out->shared_xy = l->made->shared_xy;
+    out->shared_yy = l->made->shared_yy;
     out->stars_identified = l->made->stars_identified;
     out->count = l->made->count;
     out->lost = l->made->lost;

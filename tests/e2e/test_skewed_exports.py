@@ -147,7 +147,9 @@ class SkewedExports(unittest.TestCase):
         slopes += [(direction(x, y, small * axis) - direction(x, y, -small * axis)) / (2 * small) for axis in np.eye(3)]
         j = axes @ np.array(slopes).T
         own = np.zeros((5, 5))
-        own[:2, :2], own[2:, 2:] = cov_px, np.diag(sigma ** 2)
+        xy, xz, yz = (fix[f"attitude_correlation_{k}"] for k in ("xy", "xz", "yz"))
+        own[:2, :2] = cov_px
+        own[2:, 2:] = np.outer(sigma, sigma) * [[1, xy, xz], [xy, 1, yz], [xz, yz, 1]]
         return d, j @ own @ j.T
 
     def test_measured_directions(self):
