@@ -128,8 +128,9 @@ void bst_generator_adapt_width(bst_generator *g) {
     for (int i = 0; i < g->source_count; i++) {
         bright += g->sources[i].found && g->sources[i].amplitude > ADAPTS_SNR;
     }
-    /* the profiles' variances are those without the pixel's */
-    if (bright < ADAPTS_STARS ||
+    /* the profiles' variances are those without the pixel's; far from a uniform path, images are no
+     * wider PSF */
+    if (g->uneven || g->smeared || bright < ADAPTS_STARS ||
         fabs(image * image - filter) < ADAPTS_FROM * fmax(filter - 1.0 / 12.0, 0.04)) {
         return;
     }
