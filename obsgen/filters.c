@@ -89,6 +89,7 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
     bst_response fitted = bst_response_widened(&response, residual.fit_px2);
     g->widening = mean_width(&fitted.source) / mean_width(&response.source);
     g->known_width = mean_width(&g->response.filter) / mean_width(&response.source);
+    g->fit_px2 = g->response.filter.across_px * g->response.filter.along_px;
     g->cross_sigma = mean_width(&g->response.both);
     g->bias_sigma = mean_width(&response.both);
     g->image_sigma = mean_width(&response.source);
@@ -114,6 +115,32 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
                                sqrt(bst_response_product(w, rest, rest) *
                                     bst_response_product(w, g->star_path, g->star_path)),
                            1.0);
+}
+
+/* Image processing makes its fits' Gaussian as wide as bright stars are: the same limits as in
+ * imgproc/measure/frame_width.c and locate.c. */
+static const double ADAPTS_FROM = 0.15, ADAPTS_SNR = 20.0;
+enum { ADAPTS_STARS = 5 };
+
+void bst_generator_adapt_width(bst_generator *g) {
+    double filter = g->fit_px2, image = g->image_sigma * g->widening;
+    int bright = 0;
+    for (int i = 0; i < g->source_count; i++) {
+        bright += g->sources[i].found && g->sources[i].amplitude > ADAPTS_SNR;
+    }
+    /* the profiles' variances are those without the pixel's; far from a uniform path, images are no
+     * wider PSF */
+    if (g->uneven || g->smeared || bright < ADAPTS_STARS ||
+        fabs(image * image - filter) < ADAPTS_FROM * fmax(filter - 1.0 / 12.0, 0.04)) {
+        return;
+    }
+    g->known_width = g->widening;
+    g->fit_px2 = g->response.source.across_px * g->response.source.along_px;
+    const bst_obsgen_path_px rest = {0.0, 0.0}, paths[2] = {rest, g->star_path};
+    for (int k = 0; k < (g->streak > 0.0 ? 2 : 1); k++) {
+        g->norm_ratio[k] = sqrt(bst_matched_product(paths[k], paths[k], image) /
+                                bst_matched_product(paths[k], paths[k], g->image_sigma));
+    }
 }
 
 /* Sets the detection threshold, cached by streak length. Streaks are counted in steps of half a

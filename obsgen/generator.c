@@ -515,6 +515,9 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             (f->truth->items[g->sources[i].item].flags & BST_TRUTH_SATURATED) != 0;
     }
     bst_generator_decide(g);
+    if (!f->response) { /* both Gaussian */
+        bst_generator_adapt_width(g);
+    }
     for (int i = 0; i < g->source_count; i++) {
         const generator_source *s = &g->sources[i];
         if (s->broken) {

@@ -93,10 +93,11 @@ struct bst_generator {
     /* lead of a point's fit over a streak's on an uneven path, by light level; see point_lead() */
     double point_lead[GENERATOR_BIASES];
     double point_flux[GENERATOR_BIASES]; /* light that a point's fit finds on it, of the whole */
-    double known_width;                  /* width of the filters' images relative to the PSF's */
+    double known_width; /* width of the fits' images relative to the PSF's: that of the filters */
+    double fit_px2;     /* squared width of the fits' images */
     /* centroid variance relative to a Gaussian of the PSF's noise-equivalent area */
     double place_ratio2;
-    double norm_ratio[2]; /* sqrt(sum p^2) of the filters' images relative to the bound's */
+    double norm_ratio[2]; /* sqrt(sum p^2) of the fits' images relative to the bound's */
     bst_crlb_table bound;
     const bst_crlb_table *image_bound, *onboard_bound; /* of the frame; NULL: from `bound` */
     bst_blend_weights blend_weights;
@@ -165,6 +166,9 @@ void bst_generator_set_image_extent(const bst_generator *g, const generator_sour
                                     double length, bst_detection *d);
 /* Sets the response of the frame's filters; the path must be set. */
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
+/* Gives the fits of a Gaussian PSF the width of the images if enough bright sources show another
+ * one; after bst_generator_decide. */
+void bst_generator_adapt_width(bst_generator *g);
 /* Sets the path and bend of the fitted streaks: those of telemetry, corrected by what image
  * processing measures on bright streaks; the path must be set. */
 void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f);

@@ -165,7 +165,7 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     open *= s->snr_ratio;
     /* a point model fitted to a short streak */
     double streak = length > 0.0 ? 0.0 : s->length * s->length / 12.0;
-    const double model = g->response.filter.across_px * g->response.filter.along_px;
+    const double model = g->fit_px2;
     const double image = g->response.source.across_px * g->response.source.along_px;
     const double images[2] = {image + streak, image}, turned[2] = {image, image + streak};
     const double models[2] = {model, model};

@@ -237,7 +237,7 @@ bool bst_blooming_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *fou
     return false;
 }
 
-void bst_blooming_finish(const bst_locate_frame *f, bst_imgproc_found *found) {
+void bst_blooming_finish(const bst_locate_frame *f, double norm, bst_imgproc_found *found) {
     bst_imgproc_source *s = &found->source;
     double width = UNFITTED_SHARE * found->bleed_px;
     if (s->fitted) {
@@ -256,7 +256,7 @@ void bst_blooming_finish(const bst_locate_frame *f, bst_imgproc_found *found) {
     double well = WELL_SHARE * found->bleed_e;
     s->flux_e = found->bleed_e;
     s->flux_variance = found->bleed_e + well * well;
-    found->snr = s->flux_e * bst_locate_norm(f, false) / found->noise_e;
+    found->snr = s->flux_e * norm / found->noise_e;
     found->flags |= BST_DETECTION_SATURATED | BST_DETECTION_BLOOM;
     found->length_px = found->width_px = BST_FWHM_PER_SIGMA * f->sigma_px;
     found->angle_rad = 0.0;

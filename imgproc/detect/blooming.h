@@ -20,7 +20,7 @@ void bst_blooming_join(bst_imgproc_locator *locator, const bst_locate_frame *fra
 bool bst_blooming_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found);
 
 /* Completes a bleeding source after the fits: flux from its charge, covariance including the PSF
- * misfit of the wings, SNR, flags and size. */
-void bst_blooming_finish(const bst_locate_frame *frame, bst_imgproc_found *found);
+ * misfit of the wings, SNR (`norm` for one electron in noise of one), flags and size. */
+void bst_blooming_finish(const bst_locate_frame *frame, double norm, bst_imgproc_found *found);
 
 #endif

@@ -150,6 +150,7 @@ bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *foun
             c.fixed[request.fixed_count++] = c.free[k];
         }
         copies[0] = *c.free[0];
+        copies[0].shape.sigma_px = w->l->profiles.sigma_px;
         request.free_count = 1;
         ok = bst_fit_run(w->fit, &request);
     }

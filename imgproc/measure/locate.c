@@ -7,6 +7,7 @@
 
 #include "imgproc/detect/blooming.h"
 #include "imgproc/measure/cosmic_ray.h"
+#include "imgproc/measure/light_scale.h"
 #include "imgproc/measure/pair_split.h"
 #include "imgproc/measure/peak_centroid.h"
 #include "imgproc/measure/source_moments.h"
@@ -81,33 +82,22 @@ void bst_imgproc_locator_free(bst_imgproc_locator *l) {
     *l = (bst_imgproc_locator){0};
 }
 
-/* Sets a shape's path to the star streak at its position, from the camera motion. */
-static void set_star_path(const bst_locate_frame *f, bst_imgproc_shape *s) {
-    bst_camera_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * s->x_px,
-                             f->origin_y_px + f->binning * s->y_px, &s->dx_px, &s->dy_px);
-    bst_camera_motion_bend(f->motion, f->camera, &s->bend_x_px, &s->bend_y_px);
-    s->dx_px /= f->binning;
-    s->dy_px /= f->binning;
-    s->bend_x_px /= f->binning;
-    s->bend_y_px /= f->binning;
-}
-
 /* Initial source at an interpolated peak: a point, or the local star streak. */
-static bst_imgproc_source initial_source(const bst_locate_frame *f, const bst_imgproc_found *found,
-                                         bool streak) {
-    bst_imgproc_source s = {.flux_e = found->top_snr * found->noise_e / bst_locate_norm(f, streak),
+static bst_imgproc_source initial_source(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                                         const bst_imgproc_found *found, bool streak) {
+    bst_imgproc_source s = {.flux_e = found->top_snr * found->noise_e / l->light[streak].response,
                             .widening_px2 = found->source.widening_px2};
     s.shape = (bst_imgproc_shape){
         .x_px = found->top_x_px, .y_px = found->top_y_px, .sigma_px = f->sigma_px};
     if (streak) {
-        set_star_path(f, &s.shape);
+        bst_light_scale_star_path(f, &s.shape);
     }
     return s;
 }
 
 /* Initialises a located source at the interpolated peak of the matched filter. */
-static void start_at_peak(const bst_locate_frame *f, const bst_candidate *c,
-                          bst_imgproc_found *out) {
+static void start_at_peak(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                          const bst_candidate *c, bst_imgproc_found *out) {
     *out = (bst_imgproc_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
     out->noise_e = bst_locate_noise_at(f, c->x, c->y);
     double dx, dy;
@@ -115,7 +105,7 @@ static void start_at_peak(const bst_locate_frame *f, const bst_candidate *c,
     out->top_x_px = c->x + dx;
     out->top_y_px = c->y + dy;
     out->streak = f->filter->streak && c->snr > bst_filter_point_at(f->filter, c->x, c->y);
-    out->source = initial_source(f, out, out->streak);
+    out->source = initial_source(l, f, out, out->streak);
 }
 
 /* Updates the longest source path of the frame. */
@@ -165,8 +155,8 @@ static void fit_shape_and_position(const bst_imgproc_worker *w, int i, bst_imgpr
     found->source.widening_px2 = bst_frame_width_mean(&l->width);
     bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
     if (is_shape_ambiguous(f, found)) {
-        bst_imgproc_source point = initial_source(f, found, false),
-                           streak = initial_source(f, found, true);
+        bst_imgproc_source point = initial_source(l, f, found, false),
+                           streak = initial_source(l, f, found, true);
         bst_imgproc_stamp stamp = bst_deblend_stamp(l, f, &streak);
         found->source = streak;
         bool streak_ok = bst_deblend_fit(w, i, found, &stamp, false);
@@ -198,11 +188,12 @@ static bool is_charge_near(const bst_imgproc_locator *l, const bst_locate_frame 
 }
 
 /* Falls back to the filter's peak for a source whose fit failed. */
-static void use_filter_peak(const bst_locate_frame *f, bst_imgproc_found *found) {
-    found->source = initial_source(f, found, found->streak);
+static void use_filter_peak(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                            bst_imgproc_found *found) {
+    found->source = initial_source(l, f, found, found->streak);
     found->source.cov_xx = found->source.cov_yy = 1.0;
     found->source.cov_xy = 0.0;
-    double sigma = found->noise_e / bst_locate_norm(f, found->streak);
+    double sigma = found->noise_e / l->light[found->streak].response;
     found->source.flux_variance = sigma * sigma + f->excess * found->source.flux_e;
 }
 
@@ -254,10 +245,11 @@ static void label_artefact(bst_imgproc_found *found) {
 
 /* Sets flags and label after the fit. Light beyond the edge fits with any flux, so a source fitted
  * outside the frame falls back to the filter's peak and becomes an ARTEFACT. */
-static void set_flags(const bst_locate_frame *f, bst_imgproc_found *found) {
+static void set_flags(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                      bst_imgproc_found *found) {
     bool outside = is_outside(f, &found->source.shape);
     if (outside) {
-        use_filter_peak(f, found);
+        use_filter_peak(l, f, found);
         found->snr = (double)found->peak_snr;
         found->flags |= BST_DETECTION_EDGE;
     }
@@ -293,7 +285,7 @@ typedef struct loop {
 static void start_range(void *user, int begin, int end) {
     const loop *p = user;
     for (int i = begin; i < end; i++) {
-        start_at_peak(p->f, &p->candidates->items[p->l->from[i]], &p->l->found[i]);
+        start_at_peak(p->l, p->f, &p->candidates->items[p->l->from[i]], &p->l->found[i]);
     }
 }
 
@@ -345,14 +337,29 @@ static void add_width(bst_imgproc_locator *l, const bst_imgproc_found *found) {
 }
 
 /* Fits the brightest sources, up to `end`, until they say that the PSF is as wide as it is taken
- * for. */
+ * for. The others then start with the light that their filter output has in that PSF. */
 static void fit_brightest(bst_imgproc_locator *l, const bst_locate_frame *f, int end) {
+    bool again = false;
     do {
+        for (int i = 0; again && i < end; i++) { /* neighbours are as wide as the new PSF */
+            l->found[i].source.widening_px2 = 0.0;
+        }
         process_group(l, f, 0, end, first_fit);
         for (int i = 0; i < end; i++) {
             add_width(l, &l->found[i]);
         }
-    } while (bst_frame_width_adapt(&l->width, &l->profiles, &l->psf));
+        again = bst_frame_width_adapt(&l->width, &l->profiles, &l->psf);
+    } while (again);
+    if (l->width.rounds == 0) {
+        return;
+    }
+    bst_light_scale_adapt(l, f);
+    for (int i = end; i < l->count; i++) {
+        bst_imgproc_found *found = &l->found[i];
+        if (!found->bleed) {
+            found->source = initial_source(l, f, found, found->streak);
+        }
+    }
 }
 
 /* Locates a source at the filter's peak; one with charge is fitted, because the filter lacks its
@@ -405,19 +412,19 @@ static void second_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *fo
 static void finish_source(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     const bst_locate_frame *f = w->f;
     if (found->bleed) {
-        bst_blooming_finish(f, found);
+        bst_blooming_finish(f, w->l->light[0].norm, found);
         flag_edge(f, found);
         return;
     }
     if (!found->source.fitted) {
-        use_filter_peak(f, found);
+        use_filter_peak(w->l, f, found);
     }
-    found->snr = found->source.flux_e * bst_locate_norm(f, found->streak) / found->noise_e;
+    found->snr = found->source.flux_e * w->l->light[found->streak].norm / found->noise_e;
     if (found->snr < BST_CHARGE_LIGHT_SNR && is_charge_near(w->l, f, found)) {
         found->dropped = true;
         return;
     }
-    set_flags(f, found);
+    set_flags(w->l, f, found);
     bool alone = !(found->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE));
     if (alone && !found->rough && !found->streak && found->label == BST_LABEL_UNKNOWN &&
         found->snr >= BST_EXTENT_SNR) {
@@ -428,18 +435,6 @@ static void finish_source(const bst_imgproc_worker *w, int i, bst_imgproc_found 
         (found->snr >= BST_EXTENT_SNR && found->length_px > 1.5 * fmax(found->width_px, 1.0) &&
          found->length_px > 1.5 * BST_FWHM_PER_SIGMA * f->sigma_px)) {
         found->flags |= BST_DETECTION_STREAK;
-    }
-}
-
-/* Sets the error laws of filter-peak positions for points and for the star streak. */
-static void set_peak_error_laws(bst_imgproc_locator *l, const bst_locate_frame *f) {
-    bst_imgproc_worker w = {l, f, &l->fits[0]};
-    bst_imgproc_shape shape = {
-        .x_px = 0.5 * f->width, .y_px = 0.5 * f->height, .sigma_px = f->sigma_px};
-    l->law[0] = bst_peak_centroid_law_of(&w, &shape);
-    if (f->filter->streak) {
-        set_star_path(f, &shape);
-        l->law[1] = bst_peak_centroid_law_of(&w, &shape);
     }
 }
 
@@ -479,6 +474,7 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
     l->longest_px = 0.0;
     int fits = l->max_fits > 0 && l->max_fits < l->count ? l->max_fits : l->count;
     select_brightest(l, candidates, fits);
+    bst_light_scale_clear(l, f);
     loop p = {l, f, candidates, NULL, 0};
     bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_range, &p);
     for (int i = 0; i < l->count; i++) {
@@ -488,7 +484,12 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
     bst_locate_prepare(l, f);
     bst_blooming_join(l, f);
     bst_cosmic_ray_remove(l, f);
-    const int brightest = FIRST_GROUP < fits ? FIRST_GROUP : fits;
+    /* those that know no width of their own wait for that of the others */
+    int brightest = 0;
+    while (brightest < fits && brightest < FIRST_GROUP &&
+           (double)l->found[brightest].peak_snr > WIDTH_FIT_SNR) {
+        brightest++;
+    }
     bst_frame_width_clear(&l->width, &l->profiles);
     fit_brightest(l, f, brightest);
     for (int first = brightest, end; first < fits; first = end) {
@@ -500,7 +501,7 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
     }
     bst_deblend_drop_doubles(l, f, fits);
     if (fits < l->count) {
-        set_peak_error_laws(l, f);
+        bst_peak_centroid_set_laws(l, f);
         process_group(l, f, fits, l->count, locate_at_peak);
     }
     process_group(l, f, 0, fits, second_fit);
@@ -573,8 +574,9 @@ void bst_locate_join_streaks(bst_imgproc_locator *l, const bst_locate_frame *f) 
 }
 
 /* Keeps a source at the filter's peak without a fit. */
-static void keep_filter_peak(const bst_locate_frame *f, bst_imgproc_found *found) {
-    use_filter_peak(f, found);
+static void keep_filter_peak(const bst_imgproc_locator *l, const bst_locate_frame *f,
+                             bst_imgproc_found *found) {
+    use_filter_peak(l, f, found);
     found->snr = (double)found->peak_snr;
     found->length_px = found->width_px = BST_FWHM_PER_SIGMA * f->sigma_px;
 }
@@ -584,7 +586,7 @@ static void start_roughly(void *user, int begin, int end) {
     const loop *p = user;
     start_range(user, begin, end);
     for (int i = begin; i < end; i++) {
-        keep_filter_peak(p->f, &p->l->found[i]);
+        keep_filter_peak(p->l, p->f, &p->l->found[i]);
     }
 }
 
@@ -592,6 +594,7 @@ void bst_locate_roughly(bst_imgproc_locator *l, const bst_locate_frame *f,
                         const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
     select_brightest(l, candidates, l->count);
+    bst_light_scale_clear(l, f);
     loop p = {l, f, candidates, NULL, 0};
     bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_roughly, &p);
 }

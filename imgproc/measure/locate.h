@@ -53,6 +53,12 @@ typedef struct bst_imgproc_peak_law {
     double xx, xy, yy, photons, norm2, flux_photons, floor_px2;
 } bst_imgproc_peak_law;
 
+/* Scale between light and SNR, in noise of one electron. */
+typedef struct bst_imgproc_light {
+    double norm;     /* SNR of a source of one electron: sqrt(sum p^2), in the PSF of the fits */
+    double response; /* output of the matched filter for it; the same if the filter has that PSF */
+} bst_imgproc_light;
+
 typedef struct bst_imgproc_locator {
     bst_imgproc_gauss psf;
     bst_source_profiles profiles;
@@ -60,6 +66,7 @@ typedef struct bst_imgproc_locator {
     int threads;
     bst_scratch_pool lent;
     bst_sharpness sharpness;
+    bst_imgproc_light light[2];  /* of a point, and of a star streak */
     bst_imgproc_peak_law law[2]; /* of a point, and of a star streak at the frame's centre */
     int max_side, capacity;
     int max_fits;                    /* number of brightest sources that are fitted; 0: all */
@@ -121,11 +128,6 @@ bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known,
                                       bst_imgproc_locator *out) BST_MUST_CHECK;
 /* Frees the memory of a locator and clears the struct, which belongs to the caller. */
 void bst_imgproc_locator_free(bst_imgproc_locator *locator);
-
-/* SNR of a source of one electron in noise of one electron, as a point or as a star streak. */
-static inline double bst_locate_norm(const bst_locate_frame *frame, bool streak) {
-    return streak ? frame->filter->streak_norm : frame->filter->norm;
-}
 
 /* Locates and measures the brightest `capacity` candidates; found is sorted by falling brightness.
  *

@@ -321,12 +321,12 @@ static int ascending(const void *a, const void *b) {
 
 /* Median widening of the bright sources: pairs among them, which look wider, do not move it much.
  */
-static double median_widening(const bst_imgproc_locator *l, const bst_locate_frame *f, int fits) {
+static double median_widening(const bst_imgproc_locator *l, int fits) {
     double all[MOST_WIDTHS];
     int count = 0;
     for (int i = 0; i < fits && count < MOST_WIDTHS; i++) {
         const bst_imgproc_found *found = &l->found[i];
-        double snr = found->source.flux_e * bst_locate_norm(f, found->streak) / found->noise_e;
+        double snr = found->source.flux_e * l->light[found->streak].norm / found->noise_e;
         if (snr > WIDTH_SNR && found->source.fitted && found->source.widening_variance > 0.0 &&
             !found->bleed && !found->dropped) {
             all[count++] = found->source.widening_px2;
@@ -339,7 +339,7 @@ static double median_widening(const bst_imgproc_locator *l, const bst_locate_fra
 void bst_pair_split(bst_imgproc_locator *l, const bst_locate_frame *f, int fits, double rate) {
     assert(l && f && fits <= l->count && rate > 0.0);
     const bst_imgproc_worker w = {l, f, &l->fits[0]};
-    double least_gain = bst_pair_least_gain(rate), widening = median_widening(l, f, fits);
+    double least_gain = bst_pair_least_gain(rate), widening = median_widening(l, fits);
     int before = l->count;
     for (int i = 0; i < fits && l->count < l->capacity; i++) {
         bst_pair pair;

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "imgproc/measure/cosmic_ray.h"
+#include "imgproc/measure/light_scale.h"
 
 /* Measured with boresight pd: position error of a quadratic through 3 x 3 outputs, px, and its
  * increase per px of streak length by the rounding of the filter's path. */
@@ -49,6 +50,24 @@ bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
     law.norm2 = square / share;
     law.flux_photons = cube / square;
     return law;
+}
+
+void bst_peak_centroid_set_laws(bst_imgproc_locator *l, const bst_locate_frame *f) {
+    bst_imgproc_worker w = {l, f, &l->fits[0]};
+    bst_imgproc_shape shape = {
+        .x_px = 0.5 * f->width, .y_px = 0.5 * f->height, .sigma_px = f->sigma_px};
+    l->law[0] = bst_peak_centroid_law_of(&w, &shape);
+    if (f->filter->streak) {
+        bst_light_scale_star_path(f, &shape);
+        l->law[1] = bst_peak_centroid_law_of(&w, &shape);
+    }
+    for (int k = 0; k < (f->filter->streak ? 2 : 1); k++) {
+        double q = l->light[k].norm / l->light[k].response, wrong = q * q;
+        l->law[k].norm2 /= wrong;
+        l->law[k].xx *= wrong * wrong;
+        l->law[k].xy *= wrong * wrong;
+        l->law[k].yy *= wrong * wrong;
+    }
 }
 
 /* Finds neighbours of a filter-peak source: flags it as a BLEND, and drops it if a brighter source

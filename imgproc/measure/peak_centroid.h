@@ -17,6 +17,13 @@
 bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
                                               const bst_imgproc_shape *shape);
 
+/* Sets the locator's error laws of points and of the star streak at the frame's centre.
+ *
+ * Notes:     A filter of the variance s^2 for images of t^2, of points: q = (s^2 + t^2)^2 / (4 s^2
+ *            t^2) is norm^2 over response^2, flux variance over that of the fit; that of places is
+ *            q^2 times the fit's. */
+void bst_peak_centroid_set_laws(bst_imgproc_locator *locator, const bst_locate_frame *frame);
+
 /* Locates source i, which is not fitted, at the filter's peak. Neighbours are not modelled: one on
  * its stamp makes it a BLEND. It is dropped if a brighter source was fitted at its position. */
 void bst_peak_centroid_place(const bst_imgproc_worker *w, int i, bst_imgproc_found *found);

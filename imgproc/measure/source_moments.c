@@ -76,7 +76,7 @@ static double chi_square_of_path(const bst_imgproc_worker *w, int i, bst_imgproc
 
 void bst_source_moments_own_streak(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     const bst_locate_frame *f = w->f;
-    double psf_fwhm = BST_FWHM_PER_SIGMA * f->sigma_px;
+    double psf_fwhm = BST_FWHM_PER_SIGMA * w->l->profiles.sigma_px;
     for (int round = 0; round < 4; round++) {
         if (!bst_source_moments_measure(w, i, found, 2.0 * bst_deblend_reach(f)) ||
             found->length_px < OWN_STREAK_LENGTH * psf_fwhm) {

@@ -151,7 +151,7 @@ static void errors_go_by_misfit_and_width(void **state) {
                                        .top_y_px = 17.0,
                                        .noise_e = 20.0,
                                        .angle_rad = 1.0};
-            bst_blooming_finish(&f, &found);
+            bst_blooming_finish(&f, 1.7, &found);
             const bst_imgproc_source *s = &found.source;
             double more = misfit < 1.0 ? 1.0 : 3.0 * misfit - 2.0, floor = pow(0.004 * width, 2.0),
                    alone = fmax(9e-4 * width * width, 0.01);

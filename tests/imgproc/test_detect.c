@@ -1,6 +1,7 @@
 /* Scenes that are hard or must not be. */
 #include <stdlib.h>
 
+#include "sim/onboard/discriminate.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
@@ -151,6 +152,80 @@ static void widened_psf_keeps_fluxes(void **state) {
         bst_assert_close(sum[1] / 24 / faint, 1.0, 0.035);
         /* 72 values: four standard deviations of the mean square */
         bst_assert_close(square / 72, 1.0, 4.0 * sqrt(2.0 / 72));
+        end(&f);
+    }
+}
+
+/* What detections of known sources are off by. */
+typedef struct deviations {
+    int count;
+    double flux, flux_square, place_square; /* means: of flux over truth, and of squared errors */
+    double snr, snr_by_error; /* means over that of the truth, and over flux / error */
+} deviations;
+
+static void add_deviation(deviations *o, const bst_detection *d, const double place[2],
+                          double flux_e, double norm) {
+    double off = (d->flux_e - flux_e) / d->flux_sigma_e, n = ++o->count;
+    double ex = d->x_px - place[0], ey = d->y_px - place[1];
+    double square = (ex * ex * d->cov_yy - 2.0 * ex * ey * d->cov_xy + ey * ey * d->cov_xx) /
+                    (d->cov_xx * d->cov_yy - d->cov_xy * d->cov_xy);
+    o->flux += (d->flux_e / flux_e - o->flux) / n;
+    o->flux_square += (off * off - o->flux_square) / n;
+    o->place_square += (0.5 * square - o->place_square) / n;
+    o->snr += (d->snr / (d->flux_e * norm) - o->snr) / n;
+    o->snr_by_error += (d->snr * d->flux_sigma_e / d->flux_e - o->snr_by_error) / n;
+}
+
+/* The PSF known rightly, half as wide again and as two thirds of it, points and streaks: fluxes,
+ * places and SNR are those of the true PSF. Read noise above all photons: SNR is flux over its
+ * error where the width is that of the frame. */
+static void psf_known_wrongly(void **state) {
+    (void)state;
+    static const double known_px[] = {2.0, 3.0, 2.0}, true_px[] = {2.0, 2.0, 3.0};
+    static const double snr[] = {60.0, 14.0};
+    enum { FRAMES = 8 };
+    for (int k = 0; k < 6; k++) {
+        fixture f = begin(256, 256);
+        const double dx = k < 3 ? 0.0 : 6.0;
+        bst_camera_motion motion = synthetic_motion(&f.s, dx, 0.0);
+        f.s.read_e = f.s.camera.read_noise_e = 400.0;
+        f.s.camera.offset_dn = 1000.0;
+        bst_camera onboard = f.s.camera;
+        onboard.psf_fwhm_px = known_px[k % 3];
+        f.s.camera.psf_fwhm_px = true_px[k % 3];
+        const double norm = synthetic_norm(&f.s, 50, 50, dx, 0) / synthetic_noise(&f.s);
+        double place[36][2];
+        for (int i = 0; i < 36; i++) {
+            place[i][0] = 30 + i % 6 * 38 + 0.1 * i;
+            place[i][1] = 30 + i / 6 * 38 + 0.07 * i;
+            synthetic_add(&f.s, place[i][0], place[i][1], snr[i >= 12] / norm, dx, 0);
+        }
+        f.s.camera = onboard;
+        deviations seen[2] = {{0}};
+        for (int n = 0; n < FRAMES; n++) {
+            synthetic_expose(&f.s, f.key, (uint64_t)n + 1);
+            process(&f, dx > 0.0 ? &motion : NULL);
+            for (int i = 0; i < 36; i++) {
+                const bst_detection *d = near_to(&f, place[i][0], place[i][1], 1.5);
+                /* a point in the middle of a pixel is sharper than a PSF known too wide allows */
+                if (!bst_label_is_charge(d->label)) {
+                    add_deviation(&seen[i >= 12], d, place[i], snr[i >= 12] / norm, norm);
+                }
+            }
+        }
+        for (int c = 0; c < 2; c++) {
+            const deviations *o = &seen[c];
+            assert_true(o->count >= FRAMES * (c == 0 ? 9 : 24));
+            /* four standard errors; a free width makes a flux's twice 1 / SNR at most */
+            bst_assert_close(o->flux, 1.0, (c == 0 ? 8.0 : 4.0) / snr[c] / sqrt(o->count));
+            bst_assert_close(o->flux_square, 1.0, 4.0 * sqrt(2.0 / o->count));
+            bst_assert_close(o->place_square, 1.0, 4.0 * sqrt(1.0 / o->count));
+            /* noise of the background to 1 %; a star streak has the norm of the frame's centre */
+            bst_assert_close(o->snr, 1.0, 0.03);
+            if (c == 1) {
+                bst_assert_close(o->snr_by_error, 1.0, 0.03);
+            }
+        }
         end(&f);
     }
 }
@@ -492,6 +567,7 @@ int main(void) {
         cmocka_unit_test(target_beside_a_streaking_star),
         cmocka_unit_test(extents_and_magnitude),
         cmocka_unit_test(widened_psf_keeps_fluxes),
+        cmocka_unit_test(psf_known_wrongly),
         cmocka_unit_test(bent_path_keeps_its_mean),
         cmocka_unit_test(bend_widens_what_does_not_follow_it),
         cmocka_unit_test(unknown_streak_is_measured),
