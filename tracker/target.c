@@ -130,8 +130,8 @@ static bool is_released(const bst_target *target, const bst_target_params *param
          rate_chi2(track, track->state.rate_radps, floor) <= params->rate_chi2)) {
         return true;
     }
-    return rate_chi2(track, bst_vec3_sub(departure, target->departure_radps), variance) >
-           params->release_chi2;
+    return !track->burned && rate_chi2(track, bst_vec3_sub(departure, target->departure_radps),
+                                       variance) > params->release_chi2;
 }
 
 bool bst_target_is_expected(const bst_target_params *params, const bst_target_cue *cue,

@@ -52,6 +52,70 @@ typedef struct resume_choice {
     double lowest, second;
 } resume_choice;
 
+/* Compares one more earlier track with the best so far. */
+static void note_choice(resume_choice *choice, bst_mtt_track *before, double misfit) {
+    if (misfit < choice->lowest) {
+        choice->second = choice->lowest;
+        choice->lowest = misfit;
+        choice->best = before;
+    } else if (misfit < choice->second) {
+        choice->second = misfit;
+    }
+}
+
+/* True if a newly confirmed track may be the object of another one that was not in its gate since
+ * the new one began. */
+static bool may_have_burned(const bst_mtt *m, int t, const bst_mtt_track *track) {
+    const bst_mtt_track *before = &m->tracks[t];
+    return before != track && before->status != BST_TRACK_TENTATIVE && !before->star &&
+           !before->at_rest && !before->asleep && !before->replaced && before->may_miss &&
+           before->merged_in_row == 0 && track->first_tick > before->gate_tick;
+}
+
+/* Compares a newly confirmed track with one that may have left its path by a burn, short against
+ * the time since its latest detection: at some time s ago both were at one place. The density of
+ * the difference (d, w) in direction and rate is q^-1 p(w) times the integral of N(d - w s; R) over
+ * s, with burns of rate q^-1 and changes of rate w as likely as any rate of an object. */
+static void compare_with_burned(bst_mtt *m, int t, int column, const bst_mtt_track *track,
+                                resume_choice *choice) {
+    const bst_mtt_params *p = &m->params;
+    bst_mtt_track *before = &m->tracks[t];
+    double x[4], c[4][4], r[2], v[2][2];
+    double dim = track->v_mag - before->v_mag;
+    double limit2 = before->v_mag_variance + track->v_mag_variance + DIMMING_MAG * DIMMING_MAG;
+    if (!(bst_vec3_dot(before->state.direction, track->state.direction) > 0.98) ||
+        !(dim * dim <= p->gate_chi2 * limit2)) {
+        return;
+    }
+    bst_sky_difference(&before->state, &track->state, x);
+    bst_sky_turn_covariance(&track->state, before->state.direction, c);
+    double span = m->now.seconds - before->last_update_s, w2 = x[2] * x[2] + x[3] * x[3];
+    double s = w2 > 0.0 ? fmin(fmax((x[0] * x[2] + x[1] * x[3]) / w2, 0.0), span) : 0.0;
+    for (int i = 0; i < 2; i++) {
+        r[i] = x[i] - s * x[i + 2];
+        for (int j = 0; j < 2; j++) {
+            double(*b)[4] = before->state.covariance;
+            v[i][j] = c[i][j] + b[i][j] - s * (c[i][j + 2] + b[i][j + 2]) -
+                      s * (c[i + 2][j] + b[i + 2][j]) + s * s * (c[i + 2][j + 2] + b[i + 2][j + 2]);
+        }
+    }
+    double det = v[0][0] * v[1][1] - v[0][1] * v[1][0];
+    double chi2 =
+        (v[1][1] * r[0] * r[0] - 2.0 * v[0][1] * r[0] * r[1] + v[0][0] * r[1] * r[1]) / det;
+    /* the detection of both decides by itself: the wider gate has judged it */
+    bool same = m->detection_of_track[t] == column;
+    if (!same && !(chi2 <= p->gate_chi2)) {
+        return;
+    }
+    double w = fmax(sqrt(w2), 1e-12), fastest = fmax(p->max_rate_radps, w);
+    double across =
+        (v[0][0] * x[3] * x[3] - 2.0 * v[0][1] * x[2] * x[3] + v[1][1] * x[2] * x[2]) / (w * w);
+    double misfit = (same ? 0.0 : chi2) + log(fmax(across, 1e-24)) + 2.0 * log(w) +
+                    2.0 * log(p->quiescent_sojourn_s) + 2.0 * log(BST_PI * fastest * fastest) -
+                    3.0 * log(2.0 * BST_PI);
+    note_choice(choice, before, misfit);
+}
+
 /* Compares a confirmed track with an earlier one: misfit in direction, rate and brightness. */
 static void compare_with_earlier(const bst_mtt *m, const bst_mtt_track *track,
                                  bst_mtt_track *before, resume_choice *choice) {
@@ -66,13 +130,7 @@ static void compare_with_earlier(const bst_mtt *m, const bst_mtt_track *track,
         return;
     }
     double misfit = chi2 + bst_mixture_log_det4(before->state.covariance);
-    if (misfit < choice->lowest) {
-        choice->second = choice->lowest;
-        choice->lowest = misfit;
-        choice->best = before;
-    } else if (misfit < choice->second) {
-        choice->second = misfit;
-    }
+    note_choice(choice, before, misfit);
 }
 
 bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
@@ -80,7 +138,11 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     for (int i = 0; anew && i < m->memory_count; i++) {
         compare_with_earlier(m, track, &m->memory[i], &choice);
     }
+    int column = m->detection_of_track[track - m->tracks];
     for (int t = 0; t < m->track_count; t++) {
+        if (anew && may_have_burned(m, t, track)) {
+            compare_with_burned(m, t, column, track, &choice);
+        }
         const bst_mtt_track *sleeper = &m->tracks[t];
         if (sleeper->asleep && !sleeper->replaced && sleeper->sight < BST_MTT_DARK &&
             track->first_tick > sleeper->last_update_tick) {
@@ -100,7 +162,11 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     track->full_glow = before->full_glow;
     track->was_bright = before->was_bright;
     track->lit = before->lit;
-    if (before->orbit.valid) {
+    bool stored = before >= m->memory && before < m->memory + m->memory_count;
+    track->burned = !stored && !before->asleep;
+    if (track->burned) {
+        track->manoeuvre_end_s = before->manoeuvre_end_s;
+    } else if (before->orbit.valid) {
         /* fuse: the stored orbit is more accurate than the few new detections */
         bst_orbit_track orbit = before->orbit;
         bst_sky_state state = orbit.sky;
@@ -110,7 +176,7 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
             track->models.count = 0;
         }
     }
-    if (before->asleep && before >= m->tracks && before < m->tracks + m->track_count) {
+    if (!stored) {
         before->replaced = true;
     } else {
         remove_stored(m, (int)(before - m->memory));

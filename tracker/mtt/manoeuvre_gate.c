@@ -109,6 +109,7 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
     for (int t = 0; t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
         m->departed_chi2[t] = 0.0;
+        track->gate_tick = m->detection_of_track[t] >= 0 ? m->now.tick : track->gate_tick;
         if (!asked || !may_manoeuvre(m, t)) {
             continue;
         }

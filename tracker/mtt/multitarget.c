@@ -493,6 +493,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     int unused = 0;
     for (int t = 0; t < m->track_count; t++) {
         m->tracks[t].last_chi2 = -1.0;
+        m->tracks[t].burned = false;
         update_track(m, t);
         bst_mtt_note_darkness(m, t);
     }
@@ -518,6 +519,7 @@ void bst_mtt_skip(bst_mtt *m, const bst_mtt_frame *frame) {
         m->observable[t] = m->tracks[t].may_miss = false;
         m->detection_of_track[t] = -1;
         m->tracks[t].last_chi2 = -1.0;
+        m->tracks[t].burned = false;
     }
     maintain_tracks(m, frame);
 }

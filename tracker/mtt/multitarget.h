@@ -145,6 +145,7 @@ typedef struct bst_mtt_track {
     double chi2;      /* sum over the hits after initiation, 2 degrees of freedom each */
     double last_chi2; /* of the latest detection; negative if the latest frame had none */
     int64_t first_tick, last_update_tick;
+    int64_t gate_tick; /* latest frame with a detection in its gate, not in a wider one */
     double last_update_s;
     bst_vec3 first_direction; /* of its first detection */
     double first_length_rad;
@@ -172,6 +173,7 @@ typedef struct bst_mtt_track {
     double innovations[BST_MTT_EVENT_WINDOW][2], brightness[BST_MTT_EVENT_WINDOW];
     int innovation_count, brightness_count; /* since the start or the latest event */
     double manoeuvre_end_s;                 /* the filter assumes a detected manoeuvre until then */
+    bool burned; /* in this frame it took over the identity of a track that it left by a burn */
 } bst_mtt_track;
 
 /* Predicted state of a track, before the update of a frame. */
