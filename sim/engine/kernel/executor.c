@@ -56,6 +56,7 @@ static sample_point *next_look(bst_executor *x, logical_process **of) {
 /* Steps a logical process without the executor's lock. */
 static void step_process(bst_executor *x, logical_process *self) {
     self->busy = true;
+    bst_observers_begin_window(&self->log);
     pthread_mutex_unlock(&x->lock);
     bst_process_step(x, self);
     pthread_mutex_lock(&x->lock);

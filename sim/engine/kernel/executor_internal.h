@@ -176,6 +176,9 @@ sample_point *bst_sync_next_look(logical_process *self);
 void bst_sync_wake(bst_executor *x);
 
 /* observers.c */
+/* Gives the next window the largest free buffer of its process: few of them grow to the size of the
+ * largest windows, not all. With the lock held. */
+void bst_observers_begin_window(observer_log *log);
 /* Checks whether observers have records to process; with the lock held. */
 bool bst_observers_ready(bst_executor *x);
 /* Checks whether half of the segments of a process wait for observers; with the lock held. */

@@ -31,7 +31,7 @@ static bst_status append(bst_ctx *ctx, record_segment *to, const record *head, c
                          size_t bytes) {
     size_t whole = RECORD_BYTES + (bytes + ALIGN - 1) / ALIGN * ALIGN;
     if (to->used + whole > to->room) {
-        size_t room = 2 * (to->room + whole) + 16384;
+        size_t room = (to->used + whole) / 2 * 3 + 4096;
         char *more = aligned_alloc(ALIGN, room / ALIGN * ALIGN);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu bytes of messages", room);
@@ -49,6 +49,17 @@ static bst_status append(bst_ctx *ctx, record_segment *to, const record *head, c
     memcpy(to->bytes + to->used + RECORD_BYTES, content, bytes);
     to->used += whole;
     return BST_OK;
+}
+
+void bst_observers_begin_window(observer_log *log) {
+    record_segment *next = &log->segments[log->filled % BST_MOST_SEGMENTS], *widest = next;
+    for (int64_t n = log->filled + 1; n < log->observed + BST_MOST_SEGMENTS; n++) {
+        record_segment *other = &log->segments[n % BST_MOST_SEGMENTS];
+        widest = other->room > widest->room ? other : widest;
+    }
+    const record_segment held = *next;
+    *next = *widest;
+    *widest = held;
 }
 
 static logical_process *process_of(const struct bst_step *step) {
