@@ -138,6 +138,33 @@ static void gltf_has_its_transforms_and_materials(void **state) {
     }
 }
 
+/* Triangles of two materials, and before them one that the file gives none: grey, after the others. */
+static void triangles_without_a_material_are_grey(void **state) {
+    (void)state;
+    char path[BST_TEST_PATH];
+    write_file(".obj",
+               "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 3 2\nusemtl gilt\nf 1 2 4\n"
+               "usemtl tin\nf 1 4 3\nf 2 3 4\n",
+               path);
+    bst_ctx ctx = {0};
+    bst_satellite *s;
+    bst_assert_ok(&ctx, bst_satellite_load(&ctx, path, &s));
+    double area[3] = {0.0};
+    static const char *const names[] = {"gilt", "tin", "grey"};
+    assert_int_equal(s->material_count, 3);
+    for (int f = 0; f < s->facet_count; f++) {
+        area[s->facets[f].material] += s->facets[f].area_m2;
+    }
+    for (int i = 0; i < 3; i++) {
+        assert_string_equal(s->materials[i].name, names[i]);
+    }
+    bst_assert_close(area[0], 2, 1e-12);
+    bst_assert_close(area[1], 2 + sqrt(12), 1e-12);
+    bst_assert_close(area[2], 2, 1e-12);
+    bst_satellite_free(s);
+    remove(path);
+}
+
 /* A mesh of a million vertices is refused at the first one too many, and says how many are
  * allowed. */
 static void too_many_vertices_are_refused(void **state) {
@@ -224,6 +251,7 @@ int main(void) {
         cmocka_unit_test(obj_boxes_are_convex_bodies),
         cmocka_unit_test(open_meshes_have_two_sides_and_shadows),
         cmocka_unit_test(gltf_has_its_transforms_and_materials),
+        cmocka_unit_test(triangles_without_a_material_are_grey),
         cmocka_unit_test(damaged_meshes_are_refused),
         cmocka_unit_test(too_many_vertices_are_refused),
         cmocka_unit_test(too_many_facets_are_refused),
