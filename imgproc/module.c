@@ -28,9 +28,7 @@ static const bst_port ports[PORT_COUNT] = {
     {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
     {BST_CHANNEL_REGIONS_OF_INTEREST, BST_PORT_OUT, 0, 0.0, 0},
 };
-
 enum { CATALOGUE_CAPACITY = 16384 };
-
 /* Least expected SNR of a star that gets a window. */
 static const double WINDOW_STAR_SNR = 12.0;
 
@@ -333,22 +331,22 @@ static bst_status detect_ahead(void *self, struct bst_step *step) {
 /* Detections of a frame: computed ahead or now. */
 static bst_status detections_of(bst_ctx *ctx, bst_imgproc_state *m, bst_imgproc_lane *l,
                                 const bst_imgproc_exposure *e, bst_detections *out, int capacity) {
-    bool made = l->ready && l->exposure_id == e->message->exposure_id;
+    const bst_detections *made = l->ready ? l->made : NULL;
     l->ready = false;
-    if (!made) {
+    if (!made || l->exposure_id != e->message->exposure_id) {
         BST_TRY(open_lane(ctx, m, l));
         return detect_sources(ctx, m, l, e, false, out, capacity);
     }
-    out->background_e = l->made->background_e;
-    out->noise_e = l->made->noise_e;
-    out->threshold_snr = l->made->threshold_snr;
-    out->shared_xx = l->made->shared_xx;
-    out->shared_xy = l->made->shared_xy;
-    out->shared_yy = l->made->shared_yy;
-    out->stars_identified = l->made->stars_identified;
-    out->count = l->made->count;
-    out->lost = l->made->lost;
-    memcpy(out->items, l->made->items, (size_t)out->count * sizeof out->items[0]);
+    out->background_e = made->background_e;
+    out->noise_e = made->noise_e;
+    out->threshold_snr = made->threshold_snr;
+    out->shared_xx = made->shared_xx;
+    out->shared_xy = made->shared_xy;
+    out->shared_yy = made->shared_yy;
+    out->stars_identified = made->stars_identified;
+    out->count = made->count;
+    out->lost = made->lost;
+    memcpy(out->items, made->items, (size_t)out->count * sizeof out->items[0]);
     return BST_OK;
 }
 

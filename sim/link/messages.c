@@ -14,6 +14,8 @@ _Static_assert(sizeof(int) == 4, "windows are four int32");
 #define REALS(s, m, n, unit, doc) FIELD_(s, m, BST_WIRE_F64, n, BST_WIRE_FINITE, 0, 0, unit, doc)
 #define BOUNDED(s, m, min, max, unit, doc) \
     FIELD_(s, m, BST_WIRE_F64, 1, BST_WIRE_RANGE, min, max, unit, doc)
+#define BOUNDED3(s, m, min, max, unit, doc) \
+    FIELD_(s, m, BST_WIRE_F64, 3, BST_WIRE_RANGE, min, max, unit, doc)
 #define VECTOR(s, m, unit, doc) REALS(s, m, 3, unit, doc)
 #define DIRECTION(s, m, doc) FIELD_(s, m, BST_WIRE_F64, 3, BST_WIRE_UNIT, 0, 0, "", doc)
 #define ATTITUDE(s, m, doc) FIELD_(s, m, BST_WIRE_F64, 4, BST_WIRE_UNIT, 0, 0, "", doc)
@@ -313,8 +315,8 @@ static const bst_wire_field tracks[] = {
     MAYBE_ATTITUDE(bst_tracks, FIX(q_cam_from_gcrf), "From stars."),
     VECTOR(bst_tracks, FIX(error_cam_rad), "rad", "Telemetry's error, camera axes."),
     REALS(bst_tracks, FIX(sigma_rad), 3, "rad", "1 sigma about camera x, y, z."),
-    FIELD_(bst_tracks, FIX(correlation), BST_WIRE_F64, 3, BST_WIRE_RANGE, -1, 1, "",
-           "Of the errors about x and y, x and z, y and z."),
+    BOUNDED3(bst_tracks, FIX(correlation), -1, 1, "",
+             "Of the errors about x and y, x and z, y and z."),
     REAL(bst_tracks, FIX(rms_px), "px", "Of the stars' residuals."),
     BOUNDED(bst_tracks, FIX(shared), 0, 1, "", "Variance that successive frames share, of all."),
     NUMBER(bst_tracks, target_id, 0, "Track of interest, 0 when none."),
