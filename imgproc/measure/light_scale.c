@@ -4,16 +4,6 @@
 
 #include "imgproc/measure/peak_centroid.h"
 
-void bst_light_scale_star_path(const bst_locate_frame *f, bst_imgproc_shape *s) {
-    bst_camera_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * s->x_px,
-                             f->origin_y_px + f->binning * s->y_px, &s->dx_px, &s->dy_px);
-    bst_camera_motion_bend(f->motion, f->camera, &s->bend_x_px, &s->bend_y_px);
-    s->dx_px /= f->binning;
-    s->dy_px /= f->binning;
-    s->bend_x_px /= f->binning;
-    s->bend_y_px /= f->binning;
-}
-
 void bst_light_scale_clear(bst_imgproc_locator *l, const bst_locate_frame *f) {
     l->light[0].norm = l->light[0].response = f->filter->norm;
     l->light[1].norm = l->light[1].response = f->filter->streak_norm;
@@ -35,7 +25,7 @@ void bst_light_scale_adapt(bst_imgproc_locator *l, const bst_locate_frame *f) {
         bst_imgproc_shape shape = {
             .x_px = 0.5 * f->width, .y_px = 0.5 * f->height, .sigma_px = own};
         if (k == 1) {
-            bst_light_scale_star_path(f, &shape);
+            bst_peak_centroid_star_path(f, &shape);
         }
         double square = square_of(l, f, filter, &shape);
         l->light[k].response *= square_of(l, f, between, &shape) / square;

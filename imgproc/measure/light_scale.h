@@ -5,9 +5,6 @@
 
 #include "imgproc/measure/deblend.h"
 
-/* Sets a shape's path to the star streak at its position, from the camera motion. */
-void bst_light_scale_star_path(const bst_locate_frame *frame, bst_imgproc_shape *shape);
-
 /* Begins a frame whose fits have the PSF of the filter. */
 void bst_light_scale_clear(bst_imgproc_locator *locator, const bst_locate_frame *frame);
 

@@ -90,7 +90,7 @@ static bst_imgproc_source initial_source(const bst_imgproc_locator *l, const bst
     s.shape = (bst_imgproc_shape){
         .x_px = found->top_x_px, .y_px = found->top_y_px, .sigma_px = f->sigma_px};
     if (streak) {
-        bst_light_scale_star_path(f, &s.shape);
+        bst_peak_centroid_star_path(f, &s.shape);
     }
     return s;
 }

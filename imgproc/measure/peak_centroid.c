@@ -3,7 +3,6 @@
 #include <math.h>
 
 #include "imgproc/measure/cosmic_ray.h"
-#include "imgproc/measure/light_scale.h"
 
 /* Measured with boresight pd: position error of a quadratic through 3 x 3 outputs, px, and its
  * increase per px of streak length by the rounding of the filter's path. */
@@ -52,13 +51,23 @@ bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
     return law;
 }
 
+void bst_peak_centroid_star_path(const bst_locate_frame *f, bst_imgproc_shape *s) {
+    bst_camera_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * s->x_px,
+                             f->origin_y_px + f->binning * s->y_px, &s->dx_px, &s->dy_px);
+    bst_camera_motion_bend(f->motion, f->camera, &s->bend_x_px, &s->bend_y_px);
+    s->dx_px /= f->binning;
+    s->dy_px /= f->binning;
+    s->bend_x_px /= f->binning;
+    s->bend_y_px /= f->binning;
+}
+
 void bst_peak_centroid_set_laws(bst_imgproc_locator *l, const bst_locate_frame *f) {
     bst_imgproc_worker w = {l, f, &l->fits[0]};
     bst_imgproc_shape shape = {
         .x_px = 0.5 * f->width, .y_px = 0.5 * f->height, .sigma_px = f->sigma_px};
     l->law[0] = bst_peak_centroid_law_of(&w, &shape);
     if (f->filter->streak) {
-        bst_light_scale_star_path(f, &shape);
+        bst_peak_centroid_star_path(f, &shape);
         l->law[1] = bst_peak_centroid_law_of(&w, &shape);
     }
     for (int k = 0; k < (f->filter->streak ? 2 : 1); k++) {

@@ -17,6 +17,9 @@
 bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
                                               const bst_imgproc_shape *shape);
 
+/* Sets a shape's path to the star streak at its position, from the camera motion. */
+void bst_peak_centroid_star_path(const bst_locate_frame *frame, bst_imgproc_shape *shape);
+
 /* Sets the locator's error laws of points and of the star streak at the frame's centre.
  *
  * Notes:     A filter of the variance s^2 for images of t^2, of points: q = (s^2 + t^2)^2 / (4 s^2
