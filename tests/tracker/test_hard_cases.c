@@ -302,8 +302,9 @@ static void manoeuvres_and_flares_are_reported(void **state) {
     }
 }
 
-/* Full speed ahead by 12 arcsec/s: the IMM keeps the object; one quiet model does, because a second gate
- * finds what has left the first one, or without events because the new track is the object's. */
+/* Full speed ahead by 12 arcsec/s: the IMM keeps the object; one quiet model does, because a second
+ * gate finds what has left the first one, or without events because the new track is the object's.
+ */
 static void filters_hold_through_a_burn(void **state) {
     (void)state;
     int held[3] = {0};

@@ -103,8 +103,9 @@ static void compare_with_burned(bst_mtt *m, int t, const bst_mtt_track *track,
     double chi2 =
         (v[1][1] * r[0] * r[0] - 2.0 * v[0][1] * r[0] * r[1] + v[0][0] * r[1] * r[1]) / det;
     /* the detection of both decides by itself: the wider gate has judged it */
-    bool same = before->last_update_tick == track->last_update_tick &&
-                before->x_px == track->x_px && before->y_px == track->y_px;
+    bool listed = track >= m->tracks && track < m->tracks + m->track_count;
+    int column = listed ? m->detection_of_track[track - m->tracks] : -1;
+    bool same = column >= 0 && m->detection_of_track[t] == column;
     if (!same && !(chi2 <= p->gate_chi2)) {
         return;
     }
