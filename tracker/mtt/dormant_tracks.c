@@ -76,7 +76,7 @@ static bool may_have_burned(const bst_mtt *m, int t, const bst_mtt_track *track)
  * the time since its latest detection: at some time s ago both were at one place. The density of
  * the difference (d, w) in direction and rate is q^-1 p(w) times the integral of N(d - w s; R) over
  * s, with burns of rate q^-1 and changes of rate w as likely as any rate of an object. */
-static void compare_with_burned(bst_mtt *m, int t, int column, const bst_mtt_track *track,
+static void compare_with_burned(bst_mtt *m, int t, const bst_mtt_track *track,
                                 resume_choice *choice) {
     const bst_mtt_params *p = &m->params;
     bst_mtt_track *before = &m->tracks[t];
@@ -103,7 +103,9 @@ static void compare_with_burned(bst_mtt *m, int t, int column, const bst_mtt_tra
     double chi2 =
         (v[1][1] * r[0] * r[0] - 2.0 * v[0][1] * r[0] * r[1] + v[0][0] * r[1] * r[1]) / det;
     /* the detection of both decides by itself: the wider gate has judged it */
-    bool same = m->detection_of_track[t] == column;
+    bool listed = track >= m->tracks && track < m->tracks + m->track_count;
+    int column = listed ? m->detection_of_track[track - m->tracks] : -1;
+    bool same = column >= 0 && m->detection_of_track[t] == column;
     if (!same && !(chi2 <= p->gate_chi2)) {
         return;
     }
@@ -138,10 +140,9 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     for (int i = 0; anew && i < m->memory_count; i++) {
         compare_with_earlier(m, track, &m->memory[i], &choice);
     }
-    int column = m->detection_of_track[track - m->tracks];
     for (int t = 0; t < m->track_count; t++) {
         if (anew && may_have_burned(m, t, track)) {
-            compare_with_burned(m, t, column, track, &choice);
+            compare_with_burned(m, t, track, &choice);
         }
         const bst_mtt_track *sleeper = &m->tracks[t];
         if (sleeper->asleep && !sleeper->replaced && sleeper->sight < BST_MTT_DARK &&
