@@ -1,6 +1,7 @@
 /* The loops of a second-order mount against closed forms, the bands of its jitter against the
  * configured RMS, and the report of a model whose numbers are all different. */
 #include <cjson/cJSON.h>
+#include <complex.h>
 
 #include "boresight/vec.h"
 #include "gimbal/modules.h"
@@ -284,11 +285,12 @@ static void response_and_gains(void **state) {
                                 CONTROL "compensator/gain_scale=0.8",
                                 CONTROL "compensator/delay_s=0.07",
                                 CONTROL "disturbance_px_rms=1.5",
-                                CONTROL "disturbance_cutoff_hz=0.08"};
+                                CONTROL "disturbance_cutoff_hz=0.08",
+                                CONTROL "command_latency_s=0.13"};
     bst_json *json;
     bst_scenario scenario;
     axes_given = 0;
-    bst_loop_model *m = model_of(&json, &scenario, sets, 9), *noisy;
+    bst_loop_model *m = model_of(&json, &scenario, sets, 10), *noisy;
     assert_int_equal(axes_given, 2);
     const double w = 2 * BST_PI * 0.7, d = 0.3, v = w * sqrt(1 - d * d);
     for (int k = 0; k < 2; k++) {
@@ -303,6 +305,26 @@ static void response_and_gains(void **state) {
             bst_assert_close(r->step[n], follows(t, w, d, fmin(40, 0.2 / r->dt_s)), 0.01);
             bst_assert_close(r->ramp_lag[n], e * sin(v * t) / v, 0.01 / w);
         }
+        /* the loop at the delays from mid-exposure on that these keys stand for */
+        const bst_loop_timing *t = &m->timing;
+        double arrival_s = 0.5 * t->exposure_s + t->frame_latency_s;
+        const bst_tracking_timing timing = {.period_s = t->period_s,
+                                            .exposure_s = t->exposure_s,
+                                            .arrival_s = arrival_s,
+                                            .effect_s = arrival_s + 0.13,
+                                            .switch_s = arrival_s + t->command_delay_s};
+        bst_tracking_loop *own;
+        bst_ctx own_ctx = {0};
+        assert_true(t->exposure_s > 0.0);
+        bst_assert_ok(&own_ctx,
+                      bst_tracking_loop_create(&own_ctx, &timing, r, NULL, &m->alpha_beta, &own));
+        bst_assert_close(bst_tracking_lag(m->axis[k].tracking), bst_tracking_lag(own), 1e-12);
+        for (double hz = 0.01; hz < 0.5; hz *= 1.7) {
+            double complex off = bst_tracking_open(m->axis[k].tracking, 2 * BST_PI * hz) -
+                                 bst_tracking_open(own, 2 * BST_PI * hz);
+            bst_assert_close(cabs(off), 0.0, 1e-9);
+        }
+        bst_tracking_loop_free(own);
         free((double *)(uintptr_t)r->step);
         free((double *)(uintptr_t)r->ramp_lag);
     }

@@ -26,8 +26,12 @@ static int reported; /* exit status of a command inside a command */
 static bst_status apply(void *self, bst_ctx *ctx, const bst_frame_stage_frame *frame,
                         uint16_t *pixels) {
     (void)self;
-    (void)frame;
     (void)pixels;
+    assert_int_equal(frame->width, 256);
+    assert_int_equal(frame->height, 192);
+    assert_int_equal(frame->window.width, 256);
+    assert_int_equal(frame->window.height, 192);
+    assert_true(frame->end_s > frame->start_s);
     FILE *null = fopen("/dev/null", "w");
     char *words[] = {"boresight", "--version", NULL};
     reported = bst_program_run(2, words, fileno(null), fileno(null));
@@ -128,7 +132,7 @@ static void one_command_runs_at_a_time(void **state) {
                      "--set",
                      "/observers/0/sensors/0/camera/width_px=256",
                      "--set",
-                     "/observers/0/sensors/0/camera/height_px=256",
+                     "/observers/0/sensors/0/camera/height_px=192",
                      "--set",
                      "/observers/0/sensors/0/modules/scenegen/frame_stage={\"plugin\": \"test:x\"}",
                      NULL};

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 
 #include "control/control.h"
+#include "sim/astro/bodies.h"
 #include "sim/onboard/knowledge.h"
 #include "tests/test_support.h"
 
@@ -339,6 +340,19 @@ static void command_carries_the_aberration_of_the_observer(void **state) {
     assert_true(r.commanded);
     /* classical aberration v / c towards the motion; relativity changes it by (v/c)^2 = 1e-8 */
     bst_assert_close(r.command.direction_gcrf.z, 30000.0 / BST_LIGHT_SPEED_MPS, 2e-8);
+    rig_close(&r);
+
+    /* a second after telemetry at rest at 7000 km, the observer falls at 8.1 m/s */
+    rig_open(&r, &config, true);
+    nav = (bst_nav_telemetry){
+        .tick = -TICKS, .position_gcrf_m = {0, 0, 7e6}, .sun_m = {1.5e11, 0, 0}};
+    bst_control_telemetry(&r.control, NULL, &nav);
+    bst_assert_ok(&ctx,
+                  bst_control_update(&ctx, &r.control, 0, &r.commanded, &r.command, &r.status));
+    assert_true(r.commanded);
+    double since_s = 1.0 + (double)r.command.tick / TICKS;
+    bst_assert_close(r.command.direction_gcrf.z,
+                     -since_s * BST_EARTH_MU_M3PS2 / (7e6 * 7e6) / BST_LIGHT_SPEED_MPS, 1e-10);
     rig_close(&r);
 }
 

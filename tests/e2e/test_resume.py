@@ -264,6 +264,8 @@ class State(unittest.TestCase):
         runs.run(runs.TRACK, whole, *self.sets, duration=20)
         manifest = runs.manifest(out)
         self.assertEqual((manifest["complete"], manifest["begins_at_s"]), (True, 12.3))
+        # its speed is that of the 7.7 s that it stepped
+        self.assertAlmostEqual(manifest["summary"]["real_time_factor"] * manifest["wall_time_s"], 7.7, delta=1e-3)  # a tick
         self.assertEqual(manifest["last_tick"], runs.manifest(whole)["last_tick"])
         new, old = runs.database(out), runs.database(whole)
         for table, key in [("frames", "start_tick"), ("detections", "exposure_id"),

@@ -28,7 +28,8 @@ static void white_noise_limit(void **state) {
         bst_assert_close(b.covariance[0][0] * b.snr * b.snr / (2 * width2), 1, 4 * tolerance);
         bst_assert_close(b.covariance[1][1] / b.covariance[0][0], 1, 1e-9); /* round */
         bst_assert_close(b.covariance[0][1] / b.covariance[0][0], 0, 1e-9);
-        /* integrals of s^2 and s^3; the pixel's kurtosis counts three times as much in the latter */
+        /* integrals of s^2 and s^3; the pixel's kurtosis counts three times as much in the latter
+         */
         bst_ctx ctx = {0};
         double powers[2], peak = 1.0 / (2 * BST_PI * width2);
         bst_assert_ok(&ctx, bst_eval_gaussian_powers(&ctx, &s, powers));

@@ -22,6 +22,10 @@ static void serve(link_scene *s, const char *name, bool shared, int leave_after)
                 sum += got.pixels[i];
             }
         } else if (got.header.type == BST_LINK_STEP) {
+            char utc[40]; /* of a tick of 1 ms, as the scene's epoch and rate are */
+            snprintf(utc, sizeof utc, "2026-01-01T00:00:%02d.%03d000Z", (int)got.header.tick / 1000,
+                     (int)got.header.tick % 1000);
+            assert_string_equal(got.header.utc, utc);
             struct {
                 bst_detections head;
                 bst_detection items[2];

@@ -138,7 +138,8 @@ static void gltf_has_its_transforms_and_materials(void **state) {
     }
 }
 
-/* Triangles of two materials, and before them one that the file gives none: grey, after the others. */
+/* Triangles of two materials, and before them one that the file gives none: grey, after the others.
+ */
 static void triangles_without_a_material_are_grey(void **state) {
     (void)state;
     char path[BST_TEST_PATH];
