@@ -45,12 +45,13 @@ static bool sun_in_image(const bst_extended_view *v, double x_px, double y_px, d
     return length > 0.0;
 }
 
-/* Share of the outline's centre in the position: 0 at the hand-over size, 1 from 1.4 times that on.
- */
+/* Share of the outline's centre in the position: 0 below 0.8 times the hand-over size, 1 from 1.2
+ * times that on. An outline of that size is good to a tenth of the PSF; the light of parts that
+ * reflect differently, to a third. */
 static double outline_share(const bst_extended_config *config, const bst_camera *camera,
                             double size_px) {
     double handover = config->handover_fwhm * camera->psf_fwhm_px;
-    double t = fmin(fmax((size_px / handover - 1.0) / 0.4, 0.0), 1.0);
+    double t = fmin(fmax((size_px / handover - 0.8) / 0.4, 0.0), 1.0);
     return t * t * (3.0 - 2.0 * t);
 }
 
@@ -92,7 +93,13 @@ void bst_extended_measure(const bst_extended_config *config, const bst_extended_
     double b = v->binning, x0 = v->origin_x_px, y0 = v->origin_y_px;
     double length = b * s->length_px;
     double light_x = x0 + b * s->light_x_px, light_y = y0 + b * s->light_y_px;
-    double centre_x = x0 + b * s->centre_x_px, centre_y = y0 + b * s->centre_y_px;
+    double centre_x = s->centre_x_px, centre_y = s->centre_y_px;
+    if (!s->edge) {
+        double spanned = length * bst_camera_scale_rad(v->camera);
+        bst_outline_centre(&s->outline, spanned, &centre_x, &centre_y);
+    }
+    centre_x = x0 + b * centre_x;
+    centre_y = y0 + b * centre_y;
     double phase = 0.0, along[2] = {0.0, 0.0}, offset = 0.0, light_offset = 0.0;
     bool lit = sun_in_image(v, centre_x, centre_y, &phase, along);
     if (lit) {

@@ -35,11 +35,12 @@ double bst_light_phase_offset(double phase_rad);
  *                    used
  *            view    `binning` and camera of the silhouette's frame
  * Returned:  *out  position, covariance, flux, extents and `extended`; label OBJECT
- * Notes:     the position is the centre of the outline less its offset towards the Sun
+ * Notes:     the position is the centre of the outline (bst_outline_centre; of one cut by the
+ *            frame's edge, the centroid) less its offset towards the Sun
  *            (bst_outline_phase_offset times the extent across the Sun's direction times
- *            phase_offset_factor). Between one and 1.4 hand-over sizes it goes over from the
- *            centroid of light, less its own offset: the position is then continuous with that of a
- *            point. Without the Sun's direction there is no offset, and the covariance grows. */
+ *            phase_offset_factor). Between 0.8 and 1.2 hand-over sizes it goes over from the
+ *            centroid of light, less its own offset: that of a point. Without the Sun's direction
+ * there is no offset, and the covariance grows. */
 void bst_extended_measure(const bst_extended_config *config, const bst_extended_view *view,
                           const bst_silhouette *silhouette, bst_detection *out);
 

@@ -42,6 +42,19 @@ void bst_outline_bounds(const bst_outline *outline, double *x0_px, double *y0_px
 void bst_outline_extent(const bst_outline *outline, double *length_px, double *angle_rad,
                         double *width_px);
 
+/* Where the centre of a body that looks the same from both sides is imaged, from perspective.
+ *
+ * Given:     angle_rad  angle that the outline's largest extent spans
+ * Returned:  *x_px, *y_px  the outline's centroid if there is no perspective (angle 0)
+ * Notes:     opposite corners of a body that is symmetric about its centre lie on a line through
+ *            that centre, and so do their images at any range, whereas the centroid moves towards
+ *            the nearer half: by size * angle * tan(tilt) / 4 for a rod. The place is where the
+ *            lines through opposite points of support meet, each weighted with the range of
+ *            directions in which the two support the outline and less the farther it misses the
+ *            place; the centroid has a standard deviation of half of size * angle. A target without
+ *            symmetry moves by no more than some of these. */
+void bst_outline_centre(const bst_outline *outline, double angle_rad, double *x_px, double *y_px);
+
 /* Extent of an outline along a direction, px.
  *
  * Given:     x, y  the direction, of length 1 */
