@@ -339,16 +339,14 @@ static bst_status detections_of(bst_ctx *ctx, bst_imgproc_state *m, bst_imgproc_
         BST_TRY(open_lane(ctx, m, l));
         return detect_sources(ctx, m, l, e, false, out, capacity);
     }
-    out->background_e = l->made->background_e;
-    out->noise_e = l->made->noise_e;
-    out->threshold_snr = l->made->threshold_snr;
-    out->shared_xx = l->made->shared_xx;
-    out->shared_xy = l->made->shared_xy;
-    out->shared_yy = l->made->shared_yy;
-    out->stars_identified = l->made->stars_identified;
-    out->count = l->made->count;
-    out->lost = l->made->lost;
-    memcpy(out->items, l->made->items, (size_t)out->count * sizeof out->items[0]);
+    const bst_detections *d = l->made;
+    out->background_e = d->background_e;
+    out->noise_e = d->noise_e;
+    out->threshold_snr = d->threshold_snr;
+    out->shared_xx = d->shared_xx, out->shared_xy = d->shared_xy, out->shared_yy = d->shared_yy;
+    out->stars_identified = d->stars_identified;
+    out->count = d->count, out->lost = d->lost;
+    memcpy(out->items, d->items, (size_t)d->count * sizeof d->items[0]);
     return BST_OK;
 }
 

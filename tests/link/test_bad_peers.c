@@ -29,7 +29,7 @@ static void bad_header(raw_peer *raw, raw_message *m) {
     raw_send(raw, m);
 }
 static void bad_version(raw_peer *raw, raw_message *m) {
-    m->text[11] = '8'; /* {"version":8 */
+    m->text[11] = '1'; /* {"version":1, long past */
     bst_link_header_seal(m->text, m->text_bytes);
     raw_send(raw, m);
 }
