@@ -127,9 +127,10 @@ void bst_imgproc_free(bst_imgproc *ip);
  * With config.max_fits, fainter detections beyond that number are located at the interpolated peak
  * of the matched filter. Their covariance is that of the filter for an isolated source.
  *
- * Returned:  *out  background_e, noise_e, threshold_snr, count, lost and items, sorted by y, then
- *                  x; label UNKNOWN or ARTEFACT, star_id 0. Beyond `capacity` the faintest are
- *                  lost. No value is NaN
+ * Returned:  *out  background_e, noise_e, threshold_snr, shared_xx, shared_xy, shared_yy,
+ *                  stars_identified (0), count, lost and items, sorted by y, then x; label UNKNOWN
+ *                  or ARTEFACT, star_id 0. Beyond `capacity` the faintest are lost. No value is
+ *                  NaN
  * Errors:    BST_ERR_ARGUMENT for a window or binning that does not fit the sensor
  * Notes:     The covariance is the inverse Fisher matrix without background uncertainty, plus an
  *            allowance for non-uniform motion. snr is sqrt(sum s^2 / sigma^2) with background noise

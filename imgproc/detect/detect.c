@@ -541,8 +541,8 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
         out->noise_e += n * (double)ip->background.median_noise;
     }
     bst_pixel_shows_sort(&ip->shows);
-    bst_imgproc_set_shared_shift(ip, motion, measured ? &used : NULL, out);
     if (pixels > 0.0) {
+        bst_imgproc_set_shared_shift(ip, motion, measured ? &used : NULL, out);
         out->background_e /= pixels;
         out->noise_e /= pixels;
     }

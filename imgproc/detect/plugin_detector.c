@@ -140,6 +140,8 @@ bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *p,
     out->shared_xx = out->shared_xy = out->shared_yy = 0.0;
     BST_TRY(with_plugin_name(ctx, p, p->stage->detect(p->self, ctx, &given, out)));
     BST_TRY(check(ctx, p, frame, out, capacity));
+    out->shared_xx = out->shared_xy = out->shared_yy = 0.0; /* depends on how it locates */
+    out->stars_identified = 0;
     qsort(out->items, (size_t)out->count, sizeof out->items[0], by_position);
     if (motion) {
         bst_camera_motion_streak(motion, p->camera, bst_camera_centre_x(p->camera),

@@ -87,6 +87,8 @@ static void good_answer(void) {
     answer->background_e = 70.0;
     answer->noise_e = 11.0;
     answer->threshold_snr = 5.0;
+    answer->shared_xx = answer->shared_xy = answer->shared_yy = 4.0; /* not the plug-in's to say */
+    answer->stars_identified = 6;
     answer->items[0] = found_at(300.0, 150.0, 1000.0);
     answer->items[1] = found_at(100.0, 150.0, 2000.0);
     answer->items[2] = found_at(339.5, 30.0, 4000.0); /* on the edge of the window */
@@ -114,6 +116,8 @@ static void detector_of_a_plug_in(void **state) {
     const double v0 = 0.25 * BST_PI * 0.15 * 0.15 * 0.7 * 0.6 * 3.6e10;
     assert_int_equal(out->count, 3);
     assert_int_equal(out->lost, 2);
+    assert_true(out->shared_xx == 0.0 && out->shared_xy == 0.0 && out->shared_yy == 0.0);
+    assert_int_equal(out->stars_identified, 0);
     for (int i = 0; i < 3; i++) {
         const bst_detection *d = &out->items[i];
         assert_true(d->x_px == order[i][0] && d->y_px == order[i][1]);
