@@ -95,14 +95,6 @@ static bst_status check(bst_ctx *ctx, const bst_plugin_detector *p, const bst_im
                         "%g (allowed: finite numbers, noise and threshold above 0)",
                         p->use->plugin, out->background_e, out->noise_e, out->threshold_snr);
     }
-    if (!(out->shared_xx >= 0.0 && out->shared_yy >= 0.0 &&
-          isfinite(out->shared_xx + out->shared_yy) &&
-          out->shared_xy * out->shared_xy <= out->shared_xx * out->shared_yy)) {
-        return bst_fail(ctx, BST_ERR_STATE,
-                        "plug-in %s gave a displacement of all streaks with the covariance %g, %g, "
-                        "%g px^2 (allowed: finite, positive semidefinite; 0: none)",
-                        p->use->plugin, out->shared_xx, out->shared_xy, out->shared_yy);
-    }
     for (int i = 0; i < out->count; i++) {
         bst_detection *d = &out->items[i];
         if (!is_valid(d, &frame->window)) {
@@ -137,7 +129,6 @@ bst_status bst_plugin_detector_detect(bst_ctx *ctx, bst_plugin_detector *p,
                                       .motion = motion};
     out->count = out->lost = 0;
     out->background_e = out->noise_e = out->threshold_snr = 0.0;
-    out->shared_xx = out->shared_xy = out->shared_yy = 0.0;
     BST_TRY(with_plugin_name(ctx, p, p->stage->detect(p->self, ctx, &given, out)));
     BST_TRY(check(ctx, p, frame, out, capacity));
     out->shared_xx = out->shared_xy = out->shared_yy = 0.0; /* depends on how it locates */
