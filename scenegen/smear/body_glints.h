@@ -27,9 +27,13 @@ int bst_body_glints_find(const bst_scene_source *source, const bst_body_glint_li
                          double turn_rad, bst_satellite_pose *pose,
                          bst_glint glints[BST_BODY_GLINTS_MAX]);
 
+/* Adds what the ends of an exposure that cut a glint, or pass it by at a few of its widths, ask of
+ * the poses. */
+int bst_body_glints_cut(bst_glint *glints, int count, int room);
+
 /* Finds the times at which a plane facet turns into the light or out of it, or into the view: there
  * the slope of its light changes, which the midpoint rule with N steps misses by 1 / (8 N^2) of
- * that. Models with more than 1,024 facets have none: each is small.
+ * that. In models with more than 1,024 facets they are not looked for.
  *
  * Given:     least_rad  least change of slope that counts, per exposure
  *            pose       work memory

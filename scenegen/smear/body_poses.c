@@ -99,7 +99,7 @@ static void choose_graded(const bst_body_times_aim *aim, int count, double step,
         out->weight[k] /= sum;
     }
     out->count = all;
-    graded_error(aim, step, out);
+    graded_error(aim, step * fmax(scale, 1.0), out);
 }
 
 /* The number of graded poses. *step: in the middle, sigmas. */

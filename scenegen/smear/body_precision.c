@@ -4,7 +4,7 @@
 
 /* Shares of the tolerance for cells with a border, for curved surfaces, and for their borders; and
  * for the poses of models with curved surfaces, without, and where many blur the image. Together
- * with that of the nodes they are the whole. */
+ * with that of the nodes they are about the whole: the limits of smear_body.c. */
 #define CELL_SHARE 0.35
 #define CURVED_SHARE 0.12
 #define LIMB_SHARE 0.05
@@ -16,7 +16,7 @@
  */
 #define BORDER_LIGHT 0.1
 
-/* Error of the light of a surface that glints: see body_poses.c. */
+/* Error of the light of a surface that glints: tests/scenegen/test_body_poses.c. */
 #define GLINT_ERROR 1e-4
 /* Error of the light of curved surfaces, over that light and the error of their parts in px:
  * measured for satellites of scenarios/satellites, at most 2 where lobes are narrow. */
@@ -27,7 +27,8 @@
  * and the side in px: 0.0005 for falcon_9_second_stage, 0.0008 for iss_like, with 10^4 electrons.
  */
 #define CURVED_CELL 1e-3
-/* The same for a facet that turns into the light: a larger error asks for poses beside it. */
+/* Share of the tolerance for a facet that turns into the light: a larger error asks for poses
+ * beside it. */
 #define KINK_SHARE 0.03
 /* Light of the brightest facet over the mean that is expected, at most. */
 #define BRIGHTER 4.0
@@ -41,6 +42,9 @@
  * may go without second moments: those of a cell are wrong by 0.0016 of the light at most, with
  * both signs as the edge passes. */
 #define EVEN_SIGMAS 120.0
+
+/* Side of cells of images of a few poses, px, in which errors of nodes have the same signs. */
+#define SOME_CELL_PX 0.25
 
 /* Error by cells with a border, of which the second moments are right to some 0.02 of the square of
  * the side, over the light of a pixel. */
@@ -68,13 +72,13 @@ double bst_body_curved_px(const bst_smear *s, double curved_e) {
                 BST_RESOLVED_CURVED_PX);
 }
 
-double bst_body_cell_px(const bst_body_image_plan *p, bool light_only, bool blurred) {
-    enum { FINEST = 32, ACROSS = 32, MOST_ACROSS = 4096 };
+double bst_body_cell_px(const bst_body_image_plan *p, double area_px2, bool light_only,
+                        bool blurred) {
+    enum { FINEST = 32, ACROSS = 32, MOST_ACROSS = 4096, MOST_CELLS = 1 << 22 };
     const bst_smear *s = p->s;
     double across_px = 2.0 * bst_smear_radius_px(s, p->source);
-    /* errors of nodes of some poses have the same signs */
     bool some = light_only && p->times.count > 1;
-    double side = light_only && blurred ? 1.0 : some ? 0.25 : 0.5;
+    double side = light_only && blurred ? 1.0 : some ? SOME_CELL_PX : 0.5;
     double allowed_e = CELL_SHARE * s->options.tolerance_sigma * border_noise_e(s, p->light_e);
     while (!light_only && !blurred && side > 1.0 / FINEST &&
            cell_error(s, p->source, side) * p->light_e > allowed_e &&
@@ -83,6 +87,10 @@ double bst_body_cell_px(const bst_body_image_plan *p, bool light_only, bool blur
     }
     while (side > across_px / ACROSS) {
         side *= 0.5;
+    }
+    /* some 400 bytes a cell, with those of the threads */
+    while (light_only && area_px2 > MOST_CELLS * side * side && side < 0.5) {
+        side *= 2.0;
     }
     return side;
 }
@@ -152,12 +160,13 @@ void bst_body_set_error(bst_body_image_plan *d, bst_smear_body *b, double *light
     if (b->one_pose) {
         error = d->turned_px * d->turned_px / 12.0 * 0.12 / (sigma_px * sigma_px);
     }
-    if (!m->second && !b->blurred) {
+    if (!b->blurred && (!m->second || (d->times.count > 1 && b->cell_px > SOME_CELL_PX))) {
         error += cell_error(s, d->source, b->cell_px);
     }
-    double limb = 0.4 * fmin(d->limb_px, d->curved_px) / sigma_px;
+    double curved_px = fmax(d->curved_px, m->reached_px[0]);
+    double limb = 0.4 * fmax(fmin(d->limb_px, d->curved_px), m->reached_px[1]) / sigma_px;
     b->sigma = error * *light_e / border_noise_e(s, *light_e) +
-               (CURVED_ERROR * d->curved_px + limb) * *curved_e / border_noise_e(s, *curved_e) +
+               (CURVED_ERROR * curved_px + limb) * *curved_e / border_noise_e(s, *curved_e) +
                bst_body_times_sigma(&d->times, d->pose_e, *light_e, s->dark_variance_e2);
     b->sigma += STAMP_SHARE * s->options.tolerance_sigma;
     if (d->glint_count > 0) {

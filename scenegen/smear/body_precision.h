@@ -26,9 +26,11 @@ double bst_body_curved_px(const bst_smear *s, double curved_e);
 
 /* Side of the cells for the body, px: a power of two of pixels, or less for small bodies.
  *
- * Given:     light_only  see bst_resolved_add_light: all second moments of cells are known
+ * Given:     area_px2    of the image
+ *            light_only  see bst_resolved_add_light: all second moments of cells are known
  *            blurred     borders fall on all parts of the cells */
-double bst_body_cell_px(const bst_body_image_plan *plan, bool light_only, bool blurred);
+double bst_body_cell_px(const bst_body_image_plan *plan, double area_px2, bool light_only,
+                        bool blurred);
 
 /* Chooses the poses of a body that turns, in plan->times.
  *

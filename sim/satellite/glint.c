@@ -118,7 +118,7 @@ int bst_glint_find(const bst_glint_surface *surfaces, int count, double widen_ra
         double u = n * step;
         course(user, u + step, after);
         for (int i = 0; i < count; i++) {
-            if (!(here[i] <= before[i]) || !(here[i] < after[i])) {
+            if (!(here[i] <= before[i]) || !(here[i] < after[i]) || s.count == BST_GLINTS_MAX) {
                 continue;
             }
             double lobe = surfaces[i].lobe_rad + widen_rad, least;
@@ -129,7 +129,7 @@ int bst_glint_find(const bst_glint_surface *surfaces, int count, double widen_ra
             }
             double at = least_between(&s, i, u - step, u + step, &least);
             double fall = fmax(before[i], after[i]) - least;
-            if (least < REACH * lobe && fall > 0.2 * lobe && s.count < BST_GLINTS_MAX) {
+            if (least < REACH * lobe && fall > 0.2 * lobe) {
                 s.glints[s.count++] = (bst_glint){at, step * lobe / fall};
             }
         }

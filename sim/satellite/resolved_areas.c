@@ -321,6 +321,9 @@ void bst_resolved_join_light(bst_resolved *to, bst_resolved *from) {
     add_kept(&from->areas);
     bst_area_sums_add(&to->areas.sums, &from->areas.sums);
     to->image.surface_light = fmax(to->image.surface_light, from->image.surface_light);
+    for (int i = 0; i < 2; i++) {
+        to->image.reached_px[i] = fmax(to->image.reached_px[i], from->image.reached_px[i]);
+    }
 }
 
 void bst_resolved_end_light(bst_resolved *r, double scale_rad) {

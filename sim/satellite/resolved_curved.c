@@ -235,10 +235,11 @@ static void divide(const bst_resolved_adding *a, int facet, curved_plan *p) {
     double radius_m =
         c->curved->sphere ? c->curved->radius_m : fmax(c->radius_m[0], c->radius_m[1]);
     const double angle[2] = {c->azimuth[1] - c->azimuth[0], c->height[1] - c->height[0]};
+    const int most = c->curved->sphere ? BST_RESOLVED_PARTS_MAX : 4 * BST_RESOLVED_PARTS_MAX;
     for (int n = 0; n < 2; n++) {
         bool round = n == 0 || c->curved->sphere;
-        p->parts[n] = round ? bst_resolved_parts(a, radius_m, angle[n], first, false) : 1;
-        p->fine[n] = round ? bst_resolved_parts(a, radius_m, angle[n], first, true) : 1;
+        p->parts[n] = round ? bst_resolved_parts(a, radius_m, angle[n], first, false, most) : 1;
+        p->fine[n] = round ? bst_resolved_parts(a, radius_m, angle[n], first, true, most) : 1;
     }
     p->half = 0.5 * angle[0] / p->parts[0];
     p->scale[0] = p->scale[1] = bst_curved_facet_scale(c, p->fine[0], p->fine[1]);

@@ -3,9 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Largest number of parts of a facet of a curved surface in one direction. */
-enum { PARTS_MAX = 64 };
-
 bst_point2 bst_resolved_project(const bst_resolved_adding *a, bst_vec3 p, double *depth_m) {
     bst_vec3 q = bst_vec3_add(a->view->origin_m, bst_mat3_mul_vec(&a->image_from_body, p));
     double f = a->per_m / q.z;
@@ -274,7 +271,7 @@ static const double PART_RAD = 0.05;
  * of the circle. A circle in the image plane is wrong by step^2 / (24 radius), the straight side of
  * a cylinder by twice that. */
 int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double angle, bst_vec3 at,
-                       bool limb) {
+                       bool limb, int most) {
     const bst_resolved_view *v = a->view;
     double depth_m, error_px = v->curved_px > 0.0 ? v->curved_px : BST_RESOLVED_CURVED_PX;
     (void)bst_resolved_project(a, at, &depth_m);
@@ -284,7 +281,11 @@ int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double ang
     }
     double step_px = sqrt(12.0 * radius_px * error_px);
     double parts = fmax(angle * radius_px / step_px, angle / PART_RAD);
-    return (int)fmin(ceil(parts - 1e-6), PARTS_MAX);
+    if (parts > most) {
+        double step = angle / most, *reached_px = &a->r->image.reached_px[limb];
+        *reached_px = fmax(*reached_px, radius_px * step * step / 12.0);
+    }
+    return (int)fmin(ceil(parts - 1e-6), most);
 }
 
 bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
@@ -298,7 +299,8 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
         double angle = 2.0 * BST_PI / from->count;
         double side_m = bst_vec3_norm(bst_vec3_sub(
             a->pose->vertices[r->satellite->corner[from->first + 1]], a->pose->vertices[first]));
-        around = bst_resolved_parts(a, side_m / angle, angle, a->pose->vertices[first], true);
+        around = bst_resolved_parts(a, side_m / angle, angle, a->pose->vertices[first], true,
+                                    BST_RESOLVED_PARTS_MAX);
         int most = BST_COVERAGE_CORNERS_MAX / from->count;
         around = around < most ? around : most;
     }

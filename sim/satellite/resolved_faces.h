@@ -143,9 +143,12 @@ bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a
                                       const bst_resolved_face *f, double uniform,
                                       bool pieces) BST_MUST_CHECK;
 
-/* Parts into which an arc is divided: at the limb, or elsewhere. */
+/* Most parts of an arc where they are squared; of a cylinder or cone four times as many. */
+enum { BST_RESOLVED_PARTS_MAX = 64 };
+
+/* Parts into which an arc is divided: at the limb, or elsewhere, at most `most`. */
 int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double angle, bst_vec3 at,
-                       bool limb);
+                       bool limb, int most);
 
 /* Adds a plane facet to the surface; f: work space, with part and body set. BST_ERR_MEMORY. */
 bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,

@@ -102,7 +102,7 @@ bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *r, const double low[2]
         }
     }
     m->second = NULL;
-    m->surface_light = m->curved_light = 0.0;
+    m->surface_light = m->curved_light = m->reached_px[0] = m->reached_px[1] = 0.0;
     memset(m->cells, 0, need * sizeof *m->cells);
     memset(m->part, -1, need * sizeof *m->part);
     return bst_visible_surface_begin(ctx, &r->surface, m->width, m->height);

@@ -51,6 +51,9 @@ typedef struct bst_resolved_image {
     /* most light of a surface in any pose, and of one that is curved or has a round border, per
      * px^2, without the weight */
     double surface_light, curved_light;
+    /* error of parts of curved surfaces ([0]) and of their borders ([1]) where more parts were
+     * asked for than are made, px; 0: none */
+    double reached_px[2];
     int16_t *part; /* [height][width] part that covers most of the cell in the latest pose
                       added; -1: none */
 } bst_resolved_image;

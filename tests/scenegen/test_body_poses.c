@@ -1,6 +1,7 @@
 /* The poses of a turning body: the image of an edge that moves is that of its integral. */
 #include <math.h>
 
+#include "scenegen/smear/body_glints.h"
 #include "scenegen/smear/body_poses.h"
 #include "tests/test_support.h"
 
@@ -96,8 +97,34 @@ static void test_glints(void **state) {
     }
 }
 
+/* A glint that an end of the exposure cuts, or passes by: the light that is received, by the poses
+ * of the glint and of the end. */
+static void test_cut_glints(void **state) {
+    (void)state;
+    static bst_body_times t;
+    const double lengths[] = {0.5, 10.0, 40.0}, widths[] = {0.001, 0.01, 0.1};
+    for (int n = 0; n < 2 * 9 * 33; n++) {
+        const double per = widths[n % 3], k = -4.0 + 0.25 * (n / 18), end = n / 9 % 2;
+        const double at = end > 0.0 ? 1.0 - k * per : k * per;
+        bst_glint glints[3] = {{k < 0.0 ? end : at, per}};
+        int count = bst_body_glints_cut(glints, 1, 3);
+        assert_true(count >= 2);
+        const bst_body_times_aim aim = {lengths[n / 3 % 3], 1e4, 1e4, DARK_E2, 0.05, glints, count};
+        bst_body_times_choose(&aim, &t);
+        double image = 0.0;
+        for (int i = 0; i < t.count; i++) {
+            image += t.weight[i] * lobe((t.u[i] - at) / per);
+        }
+        double right = per * (lobe_integral((1.0 - at) / per) - lobe_integral(-at / per));
+        bst_assert_close(image / right, 1.0, 1e-4); /* GLINT_ERROR of body_precision.c */
+    }
+    bst_glint whole[2] = {{0.5, 0.01}};
+    assert_int_equal(bst_body_glints_cut(whole, 1, 2), 1);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_moving_edge),
-                                       cmocka_unit_test(test_glints)};
+                                       cmocka_unit_test(test_glints),
+                                       cmocka_unit_test(test_cut_glints)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

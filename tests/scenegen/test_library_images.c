@@ -154,7 +154,9 @@ static void test_library(void **state) {
     assert_non_null(folder);
     for (struct dirent *entry; (entry = readdir(folder));) {
         char path[400];
-        if (!strstr(entry->d_name, ".json") || (wanted && !strstr(entry->d_name, wanted))) {
+        bool dear = strstr(entry->d_name, "starlink") != NULL; /* half of all time */
+        if (!strstr(entry->d_name, ".json") || (wanted && !strstr(entry->d_name, wanted)) ||
+            (dear && !slow)) {
             continue;
         }
         snprintf(path, sizeof path, "scenarios/satellites/%s", entry->d_name);
