@@ -50,7 +50,8 @@ class LoopTables:
                                            delta=1e-6)
                     own = 2.5 / np.log(10) * row["flux_sigma_e"] / row["flux_e"]
                     self.assertAlmostEqual(row["v_mag_sigma"], np.hypot(own, d["zero_point_sigma_mag"]), delta=1e-6)
-                if not row["edge"] + row["blend"] + row["streak"]:
+                # in frames of a slew the PSF of the fits is wider than that of the filter with the threshold
+                if k in quiet and not row["edge"] + row["blend"] + row["streak"]:
                     self.assertGreater(row["snr"], 0.85 * d["threshold_snr"])
                 self.assertGreater(row["cov_xx_px2"] * row["cov_yy_px2"], row["cov_xy_px2"] ** 2)
                 self.assertGreaterEqual(row["length_px"], row["width_px"] - 1e-9)
