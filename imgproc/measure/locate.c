@@ -343,6 +343,7 @@ static void fit_brightest(bst_imgproc_locator *l, const bst_locate_frame *f, int
     do {
         for (int i = 0; again && i < end; i++) { /* neighbours are as wide as the new PSF */
             l->found[i].source.widening_px2 = 0.0;
+            l->found[i].flags &= ~(unsigned)BST_DETECTION_BLEND; /* the fit sets it */
         }
         process_group(l, f, 0, end, first_fit);
         for (int i = 0; i < end; i++) {

@@ -82,7 +82,8 @@ class Manoeuvre(unittest.TestCase):
 class Limits(unittest.TestCase):
     """At 40,000 km across the line of sight, 1 frame/s, gate 16: the quiet model, 0.02 arcsec/s^1.5, follows
     0.08 arcsec/s^2, 15 m/s^2; one of 1 arcsec/s^1.5 is found up to 1.15 arcsec/s^2, 220 m/s^2, and
-    followed up to 4 arcsec/s^2. What is held is not warned of, what is lost is."""
+    followed up to 4 arcsec/s^2. What the models follow is not warned of, what is lost is: between them a new
+    track takes over."""
 
     def both(self, key, value, followed, lost):
         more = {MODULES + "/tracker/" + key: value}

@@ -370,7 +370,7 @@ static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool obser
         return true;
     }
     if (track->status != BST_TRACK_TENTATIVE) {
-        return track->misses_in_row > p->max_misses && track->dark < 0.5;
+        return track->may_miss && track->misses_in_row > p->max_misses && track->dark < 0.5;
     }
     int allowed = p->confirm_frames - p->confirm_hits;
     return (observed && track->misses_in_row > allowed) ||
