@@ -20,8 +20,7 @@ enum {
     STARTS_A_TIME = 512
 };
 
-/* a neighbour that moved further than this from its interpolated peak requires a new fit of the
- * blend */
+/* A neighbour that is further than this from its interpolated peak asks for a new fit. */
 static const double MOVED_PX = 0.1;
 
 /* the width of the PSF is measured on sources above this SNR */
