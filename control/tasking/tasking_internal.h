@@ -32,8 +32,8 @@ double bst_tasking_information_m2(bst_vec3 direction, double range_m, bst_vec3 m
  * variance of the catalogue. Kalman filter (Bar-Shalom, Li and Kirubarajan 2001, ch. 5.2). */
 void bst_tasking_uncertainty_update(bst_tasking *tasking, int object, double seen_s,
                                     double information_m2);
-/* Updates the object of a sensor's task, which ends, with its last track. Errors: those of the
- * onboard knowledge */
+/* Updates the object of a sensor's task, which ends, with its last track; nothing if its orbit has
+ * ended. */
 void bst_tasking_take_track(bst_tasking *tasking, int sensor);
 /* Sets the sensor's pixel noise and noise-equivalent area. */
 void bst_tasking_noise(bst_tasking_sensor *sensor);

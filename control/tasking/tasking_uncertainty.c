@@ -3,9 +3,9 @@
 #include <math.h>
 
 #include "control/tasking/tasking_internal.h"
+#include "sim/astro/time.h"
 #include "sim/core/symmetric.h"
 
-#define DAY_S 86400.0
 /* time between the two places that give the direction of motion, s */
 static const double STEP_S = 1.0;
 
@@ -14,7 +14,7 @@ void bst_tasking_uncertainty_init(bst_tasking *t) {
     for (int i = 0; i < t->object_count; i++) {
         double age_s = 0.0;
         (void)bst_knowledge_element_age(t->sensors[0].knowledge, i, &age_s);
-        const double age = age_s / DAY_S;
+        const double age = age_s / BST_DAY_S;
         t->along[i] = (bst_tasking_along){.aa = sigma * sigma + drift * drift * age * age,
                                           .ad = drift * drift * age,
                                           .dd = drift * drift};
@@ -35,7 +35,7 @@ static void add_noise(const bst_tasking *t, double days, bst_tasking_along *p) {
 }
 
 double bst_tasking_sigma_m(const bst_tasking *t, int object, double now_s) {
-    const double days = now_s / DAY_S;
+    const double days = now_s / BST_DAY_S;
     bst_tasking_along p = t->along[object];
     add_noise(t, days, &p);
     return sqrt(fmax(p.aa + days * (2.0 * p.ad + days * p.dd), 0.0));
@@ -43,7 +43,7 @@ double bst_tasking_sigma_m(const bst_tasking *t, int object, double now_s) {
 
 void bst_tasking_uncertainty_update(bst_tasking *t, int object, double seen_s,
                                     double information_m2) {
-    const double days = seen_s / DAY_S;
+    const double days = seen_s / BST_DAY_S;
     bst_tasking_along *p = &t->along[object];
     if (!(information_m2 > 0.0)) {
         return;
