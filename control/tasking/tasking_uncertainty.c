@@ -5,6 +5,7 @@
 #include "control/tasking/tasking_internal.h"
 #include "sim/astro/time.h"
 #include "sim/core/symmetric.h"
+#include "sim/core/tangent.h"
 
 /* time between the two places that give the direction of motion, s */
 static const double STEP_S = 1.0;
@@ -60,11 +61,9 @@ void bst_tasking_uncertainty_update(bst_tasking *t, int object, double seen_s,
 
 double bst_tasking_information_m2(bst_vec3 direction, double range_m, bst_vec3 motion,
                                   const double covariance[2][2]) {
-    const bool polar = hypot(direction.x, direction.y) < 1e-6;
-    const bst_vec3 pole = polar ? (bst_vec3){1.0, 0.0, 0.0} : (bst_vec3){0.0, 0.0, 1.0};
-    const bst_vec3 e1 = bst_vec3_unit(bst_vec3_cross(pole, direction));
-    const bst_vec3 e2 = bst_vec3_cross(direction, e1), u = bst_vec3_unit(motion);
-    const double a[2] = {bst_vec3_dot(u, e1) / range_m, bst_vec3_dot(u, e2) / range_m};
+    const bst_tangent axes = bst_tangent_at(direction);
+    const bst_vec3 u = bst_vec3_unit(motion);
+    const double a[2] = {bst_vec3_dot(u, axes.e1) / range_m, bst_vec3_dot(u, axes.e2) / range_m};
     double inverse[2][2];
     if (!bst_symmetric_invert(2, covariance[0], inverse[0])) {
         return 0.0;

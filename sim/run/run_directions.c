@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "sim/core/archive.h"
-#include "tracker/mtt/tangent.h"
+#include "sim/core/tangent.h"
 
 enum { MOST_CENTROIDS = 1 << 24 };
 #define CENTROID_BYTES sizeof(bst_run_centroid)

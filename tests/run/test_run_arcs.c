@@ -2,9 +2,9 @@
 #include "sim/run/run_arcs.h"
 
 #include "sim/core/archive.h"
+#include "sim/core/tangent.h"
 #include "sim/run/run_directions.h"
 #include "tests/world/world_support.h"
-#include "tracker/mtt/tangent.h"
 
 enum { RATE = 10 };
 

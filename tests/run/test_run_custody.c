@@ -2,11 +2,11 @@
 #include <cjson/cJSON.h>
 
 #include "sim/core/archive.h"
+#include "sim/core/tangent.h"
 #include "sim/io/run_reader.h"
 #include "sim/run/run_custody.h"
 #include "tests/io/scratch.h"
 #include "tests/world/world_support.h"
-#include "tracker/mtt/tangent.h"
 #include "tracker/orbit/custody.h"
 
 enum { RATE = 10 };

@@ -6,8 +6,8 @@
 
 #include "boresight/rng.h"
 #include "sim/astro/bodies.h"
+#include "sim/core/tangent.h"
 #include "tests/test_support.h"
-#include "tracker/mtt/tangent.h"
 #include "tracker/orbit/orbit_initial.h"
 
 typedef struct scene {

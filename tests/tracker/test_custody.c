@@ -7,8 +7,8 @@
 
 #include "boresight/rng.h"
 #include "sim/astro/sgp4_fit.h"
+#include "sim/core/tangent.h"
 #include "tests/test_support.h"
-#include "tracker/mtt/tangent.h"
 
 #define CATALOGUE "scenarios/objects_2022-06.tle"
 

@@ -9,7 +9,7 @@
 
 #include <stdbool.h>
 
-#include "tracker/mtt/tangent.h"
+#include "sim/core/tangent.h"
 
 typedef struct bst_sky_state {
     bst_vec3 direction;      /* unit */

@@ -7,7 +7,7 @@
 #include "sim/astro/kepler.h"
 #include "sim/astro/sgp4_fit.h"
 #include "sim/core/cholesky.h"
-#include "tracker/mtt/tangent.h"
+#include "sim/core/tangent.h"
 #include "tracker/orbit/arc_outliers.h"
 
 enum {

@@ -6,7 +6,7 @@
 
 #include "sim/core/cholesky.h"
 #include "sim/core/compare.h"
-#include "tracker/mtt/tangent.h"
+#include "sim/core/tangent.h"
 
 enum { PARAMETERS = 6, MAX_ITERATIONS = 60, MAX_ROUNDS = 6 };
 

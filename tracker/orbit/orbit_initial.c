@@ -8,7 +8,7 @@
 
 #include "sim/astro/gauss_angles.h"
 #include "sim/astro/kepler.h"
-#include "tracker/mtt/tangent.h"
+#include "sim/core/tangent.h"
 
 static const double MU = BST_EARTH_MU_M3PS2;
 

@@ -9,7 +9,7 @@
 
 #include "sim/astro/kepler.h"
 #include "sim/core/invariant.h"
-#include "tracker/mtt/tangent.h"
+#include "sim/core/tangent.h"
 
 struct bst_od_path {
     bst_od_state state;

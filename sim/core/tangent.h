@@ -1,7 +1,7 @@
 /* Tangent planes of the unit sphere: axes, exponential and logarithm map, parallel transport. The
  * only singularity is at antipodal points. */
-#ifndef BST_TRACKER_MTT_TANGENT_H
-#define BST_TRACKER_MTT_TANGENT_H
+#ifndef BST_SIM_CORE_TANGENT_H
+#define BST_SIM_CORE_TANGENT_H
 
 #include "boresight/vec.h"
 
