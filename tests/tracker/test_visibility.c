@@ -341,6 +341,34 @@ static bst_mtt_sight behind(const void *user, const bst_mtt_track *track, bst_mt
     return BST_MTT_EARTH;
 }
 
+static bool is_waited_for(const void *user, const bst_mtt_track *track) {
+    (void)user;
+    (void)track;
+    return true;
+}
+
+/* The chance that an object is dark does not depend on how the time is divided into frames, and
+ * comes to the share of dark time: 60 s of every 660 s. */
+static void darkness_is_the_same_at_any_frame_period(void **state) {
+    (void)state;
+    const double steps_s[] = {1.0, 5.0, 120.0};
+    for (size_t k = 0; k < sizeof steps_s / sizeof *steps_s; k++) {
+        bst_mtt_track track = {.status = BST_TRACK_CONFIRMED};
+        bool observable = true;
+        bst_mtt m = {.tracks = &track, .track_count = 1, .observable = &observable};
+        double middle = 0.0;
+        for (; m.seconds < 1200.0; m.seconds += steps_s[k]) {
+            const bst_mtt_frame frame = {.seconds = m.seconds + steps_s[k],
+                                         .expected = is_waited_for};
+            bst_mtt_look(&m, 0, &frame);
+            middle = frame.seconds == 120.0 ? track.dark : middle;
+        }
+        /* rates of 1/600 and 1/60 per second, 120 s: (1 - exp(-2.2)) / 11 */
+        bst_assert_close(middle, (1.0 - exp(-2.2)) / 11.0, 1e-12);
+        bst_assert_close(track.dark, (1.0 - exp(-22.0)) / 11.0, 1e-12);
+    }
+}
+
 /* A track that falls asleep keeps its correlations: all of its covariances grow by one factor, and
  * its state is that of its orbit. */
 static void falling_asleep_keeps_correlations(void **state) {
@@ -393,6 +421,7 @@ static void falling_asleep_keeps_correlations(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shadow_by_angle),
+        cmocka_unit_test(darkness_is_the_same_at_any_frame_period),
         cmocka_unit_test(falling_asleep_keeps_correlations),
         cmocka_unit_test(behind_the_earth),
         cmocka_unit_test(lit_from_behind),

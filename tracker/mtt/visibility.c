@@ -91,9 +91,9 @@ static bool has_faded(const bst_mtt *m, const bst_mtt_track *track, double secon
 static void predict_darkness(bst_mtt_track *track, double dt_s, const bst_mtt_frame *frame) {
     bool waits = track->status != BST_TRACK_TENTATIVE && !track->star && !track->asleep &&
                  frame->expected && frame->expected(frame->user, track);
-    double turning = waits ? -expm1(-dt_s / BRIGHT_S) : 0.0;
-    double left = waits ? exp(-dt_s / DARK_S) : 0.0;
-    track->dark = track->dark * left + (1.0 - track->dark) * turning;
+    const double settled = DARK_S / (BRIGHT_S + DARK_S);
+    const double left = exp(-dt_s * (1.0 / BRIGHT_S + 1.0 / DARK_S));
+    track->dark = waits ? settled + (track->dark - settled) * left : 0.0;
 }
 
 void bst_mtt_note_darkness(const bst_mtt *m, int t) {
