@@ -237,6 +237,13 @@ static bst_status end_track(bst_ctx *ctx, bst_run_arcs *a, int index, slot *own,
     }
     BST_TRY(observer_at(ctx, a, s, own->tick, &arc->state.observer, &arc->state.gcrf_from_teme,
                         &unused));
+    for (int i = 0; i < 2 && arc->count > 0; i++) {
+        const bst_od_observation *z = &arc->directions[i * (arc->count - 1)];
+        bst_sky_rotation sky;
+        BST_TRY(
+            bst_sky_clock_at(ctx, a->clock, bst_world_time(a->world, z->observer.time_s), &sky));
+        arc->gcrf_from_teme[i] = sky.frames.gcrf_from_teme;
+    }
     for (int i = 0; i < arc->count; i++) {
         bst_od_observation *z = &arc->directions[i];
         for (int k = 0; k < 4; k++) {

@@ -16,6 +16,7 @@ typedef struct bst_run_arc {
      * without attitude from stars, and centroids of more than 8 frames ago, are left out. */
     int32_t count;
     bst_od_observation directions[BST_CUSTODY_DIRECTIONS];
+    bst_mat3 gcrf_from_teme[2]; /* at the first and the last direction */
 } bst_run_arc;
 
 typedef bst_status (*bst_run_arc_fn)(void *user, bst_ctx *ctx, int sensor, const bst_run_arc *arc);

@@ -369,7 +369,7 @@ static bool update(const bst_custody_orbit *orbit, const bst_run_arc *arc,
                    bst_custody_filter *filter) {
     return arc->count < LEAST_DIRECTIONS
                ? bst_custody_update(orbit, &arc->state, filter)
-               : bst_custody_update_directions(orbit, &arc->state.gcrf_from_teme, arc->directions,
+               : bst_custody_update_directions(orbit, arc->gcrf_from_teme, arc->directions,
                                                arc->count, filter);
 }
 
@@ -380,12 +380,13 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     match m;
     find_object(c, sensor, z, &m);
     bst_custody_figures *f = &c->figures;
-    /* an image of two objects is that of neither */
+    /* an image of two objects is that of neither, and may be in no one's gate */
     bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN && m.close == 0;
+    bool blended = m.best < 0 && m.close > 0;
     bool updated = clear && update(&c->orbits[m.best], arc, &c->filters[m.best]);
     f->tracks++;
-    f->ambiguous += m.best >= 0 && !clear;
-    f->uncorrelated += m.best < 0 || (clear && !updated);
+    f->ambiguous += (m.best >= 0 && !clear) || blended;
+    f->uncorrelated += (m.best < 0 && !blended) || (clear && !updated);
     double nees = NAN;
     if (updated) {
         score *s = &c->scores[m.best];
@@ -398,7 +399,7 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
         s->last_s = isnan(s->last_s) ? z->observer.time_s : fmax(s->last_s, z->observer.time_s);
         nees = bst_custody_nees(&c->filters[m.best]);
     }
-    if (m.best < 0) {
+    if (m.best < 0 && !blended) {
         BST_TRY(bst_run_candidates_take(ctx, c->candidates, sensor, arc, m.true_object));
     }
     if (!c->tracks) {

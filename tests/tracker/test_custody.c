@@ -13,6 +13,8 @@
 #define CATALOGUE "scenarios/objects_2022-06.tle"
 
 static const bst_mat3 same_axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+static const bst_mat3 both_axes[2] = {{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                                      {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}};
 static const bst_custody_config config = {.sigma_m = 500, .drift_m_per_day = 1500};
 
 /* What an observer in a circular orbit of 1,000 km height measures of an object: 0.5 arcsec and
@@ -158,11 +160,11 @@ static double nees_of_passes(const bst_elements *set, double offset_s, int draws
         }
         bst_custody_filter_init(&config, &orbit, normals, &filter);
         assert_true(observe_pass(sgp4, offset_s, 200.0 * i, key, number, pass));
-        assert_true(bst_custody_update_directions(&orbit, &same_axes, pass, 4, &filter));
+        assert_true(bst_custody_update_directions(&orbit, both_axes, pass, 4, &filter));
         const bst_custody_filter updated = filter;
         /* half of another object, that stood still */
         pass[2].direction = pass[3].direction = pass[0].direction;
-        assert_false(bst_custody_update_directions(&orbit, &same_axes, pass, 4, &filter));
+        assert_false(bst_custody_update_directions(&orbit, both_axes, pass, 4, &filter));
         assert_memory_equal(&filter, &updated, sizeof filter);
         sum += bst_custody_nees(&filter);
     }
@@ -251,7 +253,7 @@ static double nees_of_arcs(double scale, int outliers, double *sigma, int *updat
                                           .cov_11 = own * own,
                                           .cov_22 = own * own};
         }
-        if (bst_custody_update_directions(&orbit, &same_axes, arc, COUNT, &filter)) {
+        if (bst_custody_update_directions(&orbit, both_axes, arc, COUNT, &filter)) {
             double nees = bst_custody_nees(&filter);
             assert_true(bst_custody_predict_position(&orbit, &filter, 530.0, &place, &one));
             *sigma += one;
@@ -299,6 +301,104 @@ static bst_elements low_orbit(void) {
                           .arg_perigee_rad = 2.0,
                           .mean_anomaly_rad = 0.5,
                           .mean_motion_radpmin = 0.06};
+}
+
+/* Orientation of TEME, which precesses. */
+static bst_mat3 axes_at(double time_s) {
+    const double angle = 7.7e-12 * time_s;
+    return (bst_mat3){{{1, -angle, 0}, {angle, 1, 0}, {0, 0, 1}}};
+}
+
+/* State on an element set; GCRF. */
+static bst_od_state state_of(const bst_sgp4 *sgp4, double time_s) {
+    const bst_mat3 axes = axes_at(time_s);
+    bst_od_state out = {.time_s = time_s};
+    assert_true(bst_sgp4_motion(sgp4, time_s / 60.0, &out.position_m, &out.velocity_mps));
+    out.position_m = bst_mat3_mul_vec(&axes, out.position_m);
+    out.velocity_mps = bst_mat3_mul_vec(&axes, out.velocity_mps);
+    return out;
+}
+
+/* Mean NEES of an object `ahead_m` ahead of its observer on the same orbit, after an arc of a
+ * minute and a half; *updated: how many of 100. */
+static double nees_of_neighbours(const bst_elements *set, double ahead_m, int *updated) {
+    bst_ctx ctx = {0};
+    enum { DRAWS = 100, COUNT = 12 };
+    bst_elements behind = *set;
+    const bst_rng_key key = bst_rng_make_key(11, 0, "test", "neighbours");
+    const double own = 0.01 * BST_ARCSEC_RAD, photocentre_m = 0.5;
+    bst_custody_orbit orbit;
+    bst_sgp4 *object, *eye;
+    double sum = 0.0;
+    *updated = 0;
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, set, 0.0, photocentre_m, &orbit));
+    behind.mean_anomaly_rad -= ahead_m / orbit.a_m;
+    bst_assert_ok(&ctx, bst_sgp4_create(&ctx, set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &object));
+    bst_assert_ok(&ctx, bst_sgp4_create(&ctx, &behind, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &eye));
+    for (int i = 0; i < DRAWS; i++) {
+        double normals[BST_CUSTODY_STATE], draws[6];
+        bst_custody_filter filter;
+        bst_od_observation arc[COUNT];
+        for (int k = 0; k < BST_CUSTODY_STATE; k++) {
+            normals[k] = bst_rng_normal(key, (uint64_t)i, (uint64_t)k);
+            draws[k] = photocentre_m * bst_rng_normal(key, (uint64_t)i, (uint64_t)(100 + k));
+        }
+        bst_custody_filter_init(&config, &orbit, normals, &filter);
+        for (int k = 0; k < COUNT; k++) {
+            const double time_s = 500.0 + 8.0 * k;
+            const bst_od_state from = state_of(eye, time_s);
+            bst_od_state at = state_of(object, time_s);
+            bst_od_sight sight;
+            /* the photocentre turns as the object goes round */
+            const double turn = set->mean_motion_radpmin / 60.0 * time_s;
+            at.position_m.x += cos(turn) * draws[0] + sin(turn) * draws[1];
+            at.position_m.y += cos(turn) * draws[2] + sin(turn) * draws[3];
+            at.position_m.z += cos(turn) * draws[4] + sin(turn) * draws[5];
+            arc[k] = (bst_od_observation){.observer = {.time_s = time_s,
+                                                       .position_m = from.position_m,
+                                                       .velocity_mps = from.velocity_mps},
+                                          .cov_11 = own * own,
+                                          .cov_22 = own * own};
+            bst_od_see(&at, &arc[k].observer, &sight);
+            const bst_tangent axes = bst_tangent_at(sight.direction);
+            arc[k].direction = bst_tangent_exp(
+                sight.direction,
+                bst_tangent_vector(&axes,
+                                   own * bst_rng_normal(key, (uint64_t)i, (uint64_t)(10 + 2 * k)),
+                                   own * bst_rng_normal(key, (uint64_t)i, (uint64_t)(11 + 2 * k))));
+        }
+        const bst_mat3 ends[2] = {axes_at(arc[0].observer.time_s),
+                                  axes_at(arc[COUNT - 1].observer.time_s)};
+        if (bst_custody_update_directions(&orbit, ends, arc, COUNT, &filter)) {
+            sum += bst_custody_nees(&filter);
+            (*updated)++;
+        }
+    }
+    bst_sgp4_free(object);
+    bst_sgp4_free(eye);
+    return sum / fmax(*updated, 1.0);
+}
+
+/* Beside the observer directions of 0.01 arcsec are good to millimetres: they show how the
+ * photocentre turns, the precession of the axes in a minute (30 mm in the geostationary ring), and
+ * that they are no linear function of the orbit's errors. */
+static void neighbours_of_the_observer(void **state) {
+    (void)state;
+    const double ahead_m[] = {5e3, 30e3, 300e3};
+    bst_elements sets[] = {low_orbit(), low_orbit(), low_orbit()};
+    sets[1].mean_motion_radpmin = sets[2].mean_motion_radpmin = 2.0 * BST_PI / 1436.1;
+    sets[1].eccentricity = sets[2].eccentricity = 2e-4;
+    sets[2].inclination_rad = 0.001;
+    for (int i = 0; i < 9; i++) {
+        int updated;
+        const double nees = nees_of_neighbours(&sets[i / 3], ahead_m[i % 3], &updated);
+        print_message("orbit %d, %.0f km: %d of 100, NEES %.2f\n", i / 3, 1e-3 * ahead_m[i % 3],
+                      updated, nees);
+        /* the upper bound of arcs_scale_their_errors; curvature counts as noise, so that the
+         * covariance of near objects may be too large */
+        assert_true(updated > 80);
+        assert_true(nees > 4.0 && nees < 6.0 * 1.025 + 4.0 * sqrt(12.0 / 100.0));
+    }
 }
 
 /* Process noise of half a day spreads the place then and later, in one step and in many. */
@@ -386,6 +486,7 @@ int main(void) {
         cmocka_unit_test(errors_agree_with_covariances),
         cmocka_unit_test(directions_and_strong_drag),
         cmocka_unit_test(arcs_scale_their_errors),
+        cmocka_unit_test(neighbours_of_the_observer),
         cmocka_unit_test(noise_spreads_places),
         cmocka_unit_test(photocentre_and_strangers),
         cmocka_unit_test(refuses_what_is_no_ellipse),

@@ -342,7 +342,8 @@ static void one_observation(void **state) {
 enum { COUNT = 3 };
 
 /* A pass of three directions with errors of their own and errors that they share, which change
- * between them by unequal amounts; the photocentre's are the same for all. */
+ * between them by unequal amounts; the photocentre's change as the object goes round and the line
+ * of sight turns, a normal correlation in the angles of both. */
 typedef struct pass {
     bst_custody_orbit orbit;
     bst_custody_filter filter;
@@ -388,23 +389,25 @@ static void make_pass(double off_rad, pass *out) {
 /* Covariance of the directions' errors; `factor` multiplies all but the photocentre's part. */
 static void errors_of(const pass *t, double factor, double r[MOST][MOST]) {
     for (int i = 0; i < COUNT; i++) {
+        double kept = 1.0; /* of what directions share */
         for (int k = i; k < COUNT; k++) {
             const bst_od_observation *u = &t->list[i], *v = &t->list[k];
             const axes a = axes_at(u->direction), b = axes_at(v->direction);
             const bst_vec3 ea[2] = {a.e1, a.e2}, eb[2] = {b.e1, b.e2};
             const double own[2][2] = {{u->cov_11, u->cov_12}, {u->cov_12, u->cov_22}};
-            double changes = 0.0;
-            for (int m = i + 1; m <= k; m++) {
-                changes += t->list[m].shared_change;
-            }
+            kept *= k > i ? exp(-v->shared_change) : 1.0;
+            const double minutes = (v->observer.time_s - u->observer.time_s) / 60.0;
+            const double round = t->orbit.elements.mean_motion_radpmin * minutes;
+            const double turn = 2.0 * sin(0.5 * bst_vec3_angle(u->direction, v->direction));
+            const double displaced = photocentre_m * photocentre_m / t->range_m[i] / t->range_m[k] *
+                                     exp(-0.5 * (round * round + turn * turn));
             for (int p = 0; p < 2; p++) {
                 for (int q = 0; q < 2; q++) {
                     const double *sa = u->shared_rad[p], *sb = v->shared_rad[q];
-                    const double both = exp(-changes) * (sa[0] * sb[0] + sa[1] * sb[1]);
+                    const double both = kept * (sa[0] * sb[0] + sa[1] * sb[1]);
                     r[2 * i + p][2 * k + q] = r[2 * k + q][2 * i + p] =
-                        factor * (i == k ? own[p][q] : both) + photocentre_m * photocentre_m /
-                                                                   (t->range_m[i] * t->range_m[k]) *
-                                                                   bst_vec3_dot(ea[p], eb[q]);
+                        factor * (i == k ? own[p][q] : both) +
+                        displaced * bst_vec3_dot(ea[p], eb[q]);
                 }
             }
         }
@@ -415,12 +418,12 @@ static void errors_of(const pass *t, double factor, double r[MOST][MOST]) {
  * of the covariance right, and must then make all. */
 static void directions_that_share_errors(void **state) {
     (void)state;
-    const bst_mat3 turned = turned_axes();
+    const bst_mat3 turned[2] = {turned_axes(), turned_axes()};
     pass t;
     double r[MOST][MOST];
     make_pass(0.0, &t);
     bst_custody_filter after = t.filter;
-    assert_true(bst_custody_update_directions(&t.orbit, &turned, t.list, COUNT, &after));
+    assert_true(bst_custody_update_directions(&t.orbit, turned, t.list, COUNT, &after));
     double low = 0.1, high = 10.0;
     for (int trial = 0; trial < 60; trial++) {
         const double factor = sqrt(low * high);
@@ -437,7 +440,7 @@ static void directions_that_share_errors(void **state) {
  * x^2 / 8) above x. */
 static void directions_of_another_object(void **state) {
     (void)state;
-    const bst_mat3 turned = turned_axes();
+    const bst_mat3 turned[2] = {turned_axes(), turned_axes()};
     double low = 1e-5, high = 3e-3, r[MOST][MOST], ph[N][MOST], k[N][MOST], inverse[MOST][MOST],
            x = 0.0;
     pass t;
@@ -445,7 +448,7 @@ static void directions_of_another_object(void **state) {
         const double middle = 0.5 * (low + high);
         make_pass(middle, &t);
         bst_custody_filter filter = t.filter;
-        *(bst_custody_update_directions(&t.orbit, &turned, t.list, COUNT, &filter) ? &low : &high) =
+        *(bst_custody_update_directions(&t.orbit, turned, t.list, COUNT, &filter) ? &low : &high) =
             middle;
     }
     errors_of(&t, 1.0, r);

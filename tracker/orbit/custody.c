@@ -157,7 +157,7 @@ static bool make_root(const double p[N][N], double root[N][N]) {
 typedef struct measurement {
     int times, size; /* size: numbers in all */
     double time_s[BST_CUSTODY_DIRECTIONS];
-    const bst_mat3 *gcrf_from_teme;
+    bst_mat3 gcrf_from_teme[BST_CUSTODY_DIRECTIONS];
     const bst_custody_observation *track; /* NULL: directions */
     const bst_od_observation *directions;
     double factor; /* on the stated covariances */
@@ -175,8 +175,8 @@ static bool residuals(const bst_custody_orbit *o, const double x[N], const measu
         const bst_od_observer *eye = z->track ? &z->track->observer : &z->directions[i].observer;
         const bst_vec3 seen = z->track ? z->track->direction : z->directions[i].direction;
         const bst_od_state state = {.time_s = eye->time_s,
-                                    .position_m = bst_mat3_mul_vec(z->gcrf_from_teme, r[i]),
-                                    .velocity_mps = bst_mat3_mul_vec(z->gcrf_from_teme, v[i])};
+                                    .position_m = bst_mat3_mul_vec(&z->gcrf_from_teme[i], r[i]),
+                                    .velocity_mps = bst_mat3_mul_vec(&z->gcrf_from_teme[i], v[i])};
         bst_od_sight sight;
         bst_od_see(&state, eye, &sight);
         const bst_tangent axes = bst_tangent_at(seen);
@@ -194,8 +194,18 @@ static bool residuals(const bst_custody_orbit *o, const double x[N], const measu
     return true;
 }
 
-/* Covariance of the measurement's errors, with that of the photocentre, which is the same for all
- * directions of a pass. */
+/* Correlation of the photocentre's displacement at two directions of a pass. It turns with the line
+ * of sight and grows with the phase angle, by about itself in a radian; as the object goes round,
+ * both change by its mean motion at most beside the line of sight's own turn. */
+static double photocentre_correlation(const bst_custody_orbit *o, const bst_od_observation *a,
+                                      const bst_od_observation *b) {
+    const double turn =
+        o->elements.mean_motion_radpmin / 60.0 * (b->observer.time_s - a->observer.time_s);
+    const bst_vec3 between = bst_vec3_sub(b->direction, a->direction);
+    return exp(-0.5 * (turn * turn + bst_vec3_dot(between, between)));
+}
+
+/* Covariance of the measurement's errors, with that of the photocentre. */
 static void noise(const bst_custody_orbit *o, const measurement *z,
                   const double range_m[BST_CUSTODY_DIRECTIONS], double r[M][M]) {
     if (z->track) {
@@ -216,7 +226,8 @@ static void noise(const bst_custody_orbit *o, const measurement *z,
             const bst_od_observation *b = &z->directions[k];
             const bst_tangent other = bst_tangent_at(b->direction);
             const bst_vec3 eb[2] = {other.e1, other.e2};
-            const double spread2 = o->photocentre_m / range_m[i] * (o->photocentre_m / range_m[k]);
+            const double spread2 = o->photocentre_m / range_m[i] * (o->photocentre_m / range_m[k]) *
+                                   photocentre_correlation(o, a, b);
             const double own[2][2] = {{a->cov_11, a->cov_12}, {a->cov_12, a->cov_22}};
             kept *= k > i ? exp(-b->shared_change) : 1.0;
             for (int p = 0; p < 2; p++) {
@@ -336,7 +347,7 @@ static measurement of_track(const bst_custody_observation *z) {
                          .size = 4,
                          .factor = 1.0,
                          .time_s = {z->observer.time_s},
-                         .gcrf_from_teme = &z->gcrf_from_teme,
+                         .gcrf_from_teme = {z->gcrf_from_teme},
                          .track = z};
 }
 
@@ -499,20 +510,23 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
     return update(orbit, &z, filter, NULL);
 }
 
-static measurement of_directions(const bst_mat3 *gcrf_from_teme,
+/* Directions; axes: orientation of TEME at two times, linear between and beyond them. */
+static measurement of_directions(const bst_mat3 axes[2], const double axes_s[2],
                                  const bst_od_observation *directions, int count) {
-    measurement z = {.times = count,
-                     .size = 2 * count,
-                     .gcrf_from_teme = gcrf_from_teme,
-                     .directions = directions,
-                     .factor = 1.0};
+    measurement z = {.times = count, .size = 2 * count, .directions = directions, .factor = 1.0};
+    const double span = axes_s[1] - axes_s[0];
     for (int i = 0; i < count; i++) {
         z.time_s[i] = directions[i].observer.time_s;
+        const double part = span > 0.0 ? (z.time_s[i] - axes_s[0]) / span : 0.0;
+        for (int k = 0; k < 9; k++) {
+            const double first = axes[0].m[k / 3][k % 3], last = axes[1].m[k / 3][k % 3];
+            z.gcrf_from_teme[i].m[k / 3][k % 3] = first + part * (last - first);
+        }
     }
     return z;
 }
 
-bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat3 *gcrf_from_teme,
+bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat3 gcrf_from_teme[2],
                                    const bst_od_observation *directions, int count,
                                    bst_custody_filter *filter) {
     assert(orbit && gcrf_from_teme && directions && filter);
@@ -520,7 +534,8 @@ bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat
     bst_od_observation kept[BST_CUSTODY_DIRECTIONS];
     memcpy(kept, directions, (size_t)count * sizeof *kept);
     const int least = count - count / MOST_REJECTED;
-    measurement z = of_directions(gcrf_from_teme, kept, count);
+    const double axes_s[2] = {kept[0].observer.time_s, kept[count - 1].observer.time_s};
+    measurement z = of_directions(gcrf_from_teme, axes_s, kept, count);
     bst_custody_filter next;
     fit quality;
     for (;;) {
@@ -533,7 +548,7 @@ bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat
             break;
         }
         bst_arc_drop(kept, z.times, worst);
-        z = of_directions(gcrf_from_teme, kept, z.times - 1);
+        z = of_directions(gcrf_from_teme, axes_s, kept, z.times - 1);
     }
     if (!(quality.innovations < most_chi2(z.size))) {
         return false;

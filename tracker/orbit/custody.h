@@ -109,9 +109,10 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
  * several ones: a chi-square of the innovations that is exceeded with probability 2e-5 by errors
  * twice as large as stated.
  *
- * Given:     count  1 to BST_CUSTODY_DIRECTIONS, in order of time; gcrf_from_teme: for all of them
- */
-bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat3 *gcrf_from_teme,
+ * Given:     count           1 to BST_CUSTODY_DIRECTIONS, in order of time
+ *            gcrf_from_teme  at the first and at the last of them: of a near object a direction of
+ *                            two milliarcseconds shows the precession of half a minute */
+bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat3 gcrf_from_teme[2],
                                    const bst_od_observation *directions, int count,
                                    bst_custody_filter *filter);
 
