@@ -342,8 +342,7 @@ static void one_observation(void **state) {
 enum { COUNT = 3 };
 
 /* A pass of three directions with errors of their own and errors that they share, which change
- * between them by unequal amounts; the photocentre's change as the object goes round and the line
- * of sight turns, a normal correlation in the angles of both. */
+ * between them by unequal amounts, as the photocentre's do by the angles of orbit and direction. */
 typedef struct pass {
     bst_custody_orbit orbit;
     bst_custody_filter filter;
