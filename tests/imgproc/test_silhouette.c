@@ -1,5 +1,8 @@
-/* Silhouettes of drawn scenes without noise: rectangles blurred by a Gaussian, in closed form. */
-#include "imgproc/extended/silhouette.h"
+/* Silhouettes of drawn scenes without noise, rectangles blurred by a Gaussian in closed form, and
+ * the size that frames pass on. */
+#include <stdlib.h>
+
+#include "imgproc/extended/extended_step.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 96 };
@@ -75,7 +78,42 @@ static void dim_panels(void **state) {
     bst_assert_close(s.length_px, hypot(28.0, 10.0), 2.0);
 }
 
+/* Standard deviation of the centre of a target of `length_px`; 0: the frame has none. */
+static double centre_sigma_px(bst_extended_step *step, double length_px) {
+    enum { ITEMS = 4 };
+    bst_detections *out = calloc(1, sizeof *out + ITEMS * sizeof *out->items);
+    assert_non_null(out);
+    const bst_optics_zero_point zero = {.stars = 0};
+    step->targets.count = length_px > 0.0;
+    step->targets.items[0] = (bst_silhouette){.length_px = length_px, .flux_e = 1e6};
+    bst_extended_step_append(step, 1.0, &zero, out, ITEMS);
+    double sigma = out->count > 0 ? sqrt(out->items[0].cov_xx) : 0.0;
+    free(out);
+    return sigma;
+}
+
+/* A target of which only a part has light remains as uncertain as all of it, for some frames. */
+static void size_of_earlier_frames(void **state) {
+    (void)state;
+    const bst_camera camera = {
+        .width_px = 512, .height_px = 512, .pixel_scale_arcsec = 120, .psf_fwhm_px = 2.5};
+    const bst_extended_config config = {
+        .enabled = true, .handover_fwhm = 3.0, .centre_sigma = 0.03};
+    bst_extended_step step = {.config = &config, .view = {.camera = &camera, .binning = 1.0}};
+    double all = centre_sigma_px(&step, 400.0);
+    assert_true(all >= 12.0);
+    double part = centre_sigma_px(&step, 130.0), least = 0.03 * 0.9 * 400.0;
+    assert_true(part >= least && part < all);
+    assert_true(centre_sigma_px(&step, 130.0) < part);
+    bst_assert_close(centre_sigma_px(&step, 400.0), all, 1e-9);
+    /* a target that is gone has no size */
+    (void)centre_sigma_px(&step, 0.0);
+    bst_extended_step fresh = {.config = &config, .view = step.view};
+    bst_assert_close(centre_sigma_px(&step, 130.0), centre_sigma_px(&fresh, 130.0), 1e-9);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(dim_panels)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(dim_panels),
+                                       cmocka_unit_test(size_of_earlier_frames)};
     return cmocka_run_group_tests_name("imgproc/silhouette", tests, NULL, NULL);
 }
