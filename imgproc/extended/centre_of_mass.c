@@ -88,7 +88,7 @@ void bst_extended_correct_point(const bst_extended_config *config, const bst_ext
 }
 
 void bst_extended_measure(const bst_extended_config *config, const bst_extended_view *v,
-                          const bst_silhouette *s, bst_detection *out) {
+                          const bst_silhouette *s, double size_px, bst_detection *out) {
     assert(config && v && v->camera && s && out && v->binning >= 1.0);
     double b = v->binning, x0 = v->origin_x_px, y0 = v->origin_y_px;
     double length = b * s->length_px;
@@ -112,7 +112,8 @@ void bst_extended_measure(const bst_extended_config *config, const bst_extended_
     double total = share * offset + (1.0 - share) * light_offset;
     double x = share * centre_x + (1.0 - share) * light_x;
     double y = share * centre_y + (1.0 - share) * light_y;
-    double sigma = hypot(config->centre_sigma * length, s->edge ? EDGE_SIGMA * length : 0.0);
+    double sigma =
+        hypot(config->centre_sigma * fmax(length, size_px), s->edge ? EDGE_SIGMA * length : 0.0);
     /* without the Sun's direction: the offset of half a lit sphere */
     double radial = lit ? OFFSET_SIGMA * total : bst_outline_phase_offset(0.5 * BST_PI) * length;
     double variance = sigma * sigma + s->flux_variance / (s->flux_e * s->flux_e) * length * length;

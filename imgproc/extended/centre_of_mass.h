@@ -34,6 +34,7 @@ double bst_light_phase_offset(double phase_rad);
  * Given:     config  handover_fwhm, phase_offset_factor, centre_sigma and the target's size are
  *                    used
  *            view    `binning` and camera of the silhouette's frame
+ *            size_px what centre_sigma is a share of, if that is more than the silhouette's size
  * Returned:  *out  position, covariance, flux, extents and `extended`; label OBJECT
  * Notes:     the position is the centre of the outline (bst_outline_centre; of one cut by the
  *            frame's edge, the centroid) less its offset towards the Sun
@@ -42,7 +43,7 @@ double bst_light_phase_offset(double phase_rad);
  *            centroid of light, less its own offset: that of a point. Without the Sun's direction
  * there is no offset, and the covariance grows. */
 void bst_extended_measure(const bst_extended_config *config, const bst_extended_view *view,
-                          const bst_silhouette *silhouette, bst_detection *out);
+                          const bst_silhouette *silhouette, double size_px, bst_detection *out);
 
 /* Moves a point detection by the offset of its centroid of light from the centre of mass.
  *

@@ -4,9 +4,10 @@
 
 #include "imgproc/extended/centre_of_mass.h"
 
-/* Hysteresis of the hand-over. */
+/* State of the hand-over. */
 typedef struct bst_handover {
-    bool extended; /* the latest frame had an extended target */
+    bool extended;  /* the latest frame had an extended target */
+    double size_px; /* of the largest target in this and earlier frames, which count for less */
 } bst_handover;
 
 /* Selects the silhouettes that are extended targets: those of at least the hand-over size, and,

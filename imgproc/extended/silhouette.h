@@ -97,8 +97,9 @@ typedef struct bst_silhouette_frame {
  *            ten-thousandth of the region's median are then left out (with `wings` a twentieth,
  * down to a thousandth in large regions and of a saturated median). Light, flux and moments are
  *            those of these pixels. The area leaves out light beyond the edges (bst_edges_outside),
- * and the outline lies at the edges (bst_edges_place). Reference: hysteresis: Canny, IEEE Trans.
- * PAMI 8, 679 (1986), section VI */
+ * and the outline lies at the edges (bst_edges_place) of light of SNR 5, and of parts that
+ * are not outside of a brighter edge from SNR 3 on. Reference: hysteresis: Canny, IEEE Trans. PAMI
+ * 8, 679 (1986), section VI */
 void bst_silhouettes_find(bst_silhouette_finder *finder, const bst_extended_config *config,
                           const bst_silhouette_frame *frame, uint8_t *mask, bst_silhouettes *out);
 

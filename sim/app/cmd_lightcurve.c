@@ -49,8 +49,9 @@ int bst_cmd_lightcurve(int argc, char **argv) {
         NUMBER("norad", BST_OPTION_INT, &r.norad, "N", "catalogue number of the satellite", 1, 1e9),
         NUMBER("observer-norad", BST_OPTION_INT, &r.observer_norad, "N",
                "catalogue number of the observer, from the same file", 1, 1e9),
-        OPTION("attitude", BST_OPTION_TEXT, &r.attitude, "LAW",
-               "nadir (default), nadir_sun, velocity, sun or inertial; scenarios have more"),
+        OPTION(
+            "attitude", BST_OPTION_TEXT, &r.attitude, "LAW|JSON",
+            "nadir (default), nadir_sun, velocity, sun or inertial, or attitude as in scenarios"),
         {.name = "earthshine",
          .kind = BST_OPTION_FLAG,
          .target = &r.earthshine,

@@ -4,7 +4,8 @@ estimated to 3 % of the apparent size, and the track is never lost.
 
     test_inspection.py build/boresight          the approach from 1.5 km to 0.2 km, one seed
     test_inspection.py build/boresight 20       from 300 m to 27 m with 20 seeds and attitudes of the target, and
-                                                scenarios/inspection.json as shipped (./dev slow)
+                                                scenarios/inspection.json as shipped and with another
+                                                attitude (./dev slow)
 """
 import json
 import os
@@ -227,7 +228,8 @@ def main():
     program = os.path.abspath(sys.argv[1])
     seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     cases = [(seed, {**LAST, **tumbling(seed)}, 90, 100) for seed in range(1, seeds + 1)]
-    cases += [(1, {}, 400, 390)] if seeds else [(1, NEAR, 30, 40)]
+    # with the attitude of seed 101 the panels reflect nothing in four frames at 380 px
+    cases += [(1, {}, 400, 390), (101, tumbling(101), 400, 390)] if seeds else [(1, NEAR, 30, 40)]
     errors = []
     with tempfile.TemporaryDirectory() as folder:
         if not seeds:

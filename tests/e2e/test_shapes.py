@@ -54,6 +54,26 @@ class Shapes(unittest.TestCase):
                                preexec_fn=lambda: os.sched_setaffinity(0, {one}))
         self.assertEqual(alone.stdout, shown.stdout)
 
+    def test_light_curve_of_a_body_that_spins(self):
+        """A phase as JSON, alone or in a list: a box that turns by 45 degrees/s comes back after 4 s."""
+        with tempfile.TemporaryDirectory() as folder:
+            box, plot = os.path.join(folder, "box.json"), os.path.join(folder, "curve.svg")
+            with open(box, "w", encoding="utf-8") as file:
+                file.write('{"materials": [{"name": "a", "diffuse": 0.8}],'
+                           ' "parts": [{"name": "p", "kind": "box", "size_m": [1, 2, 3], "material": "a"}]}')
+            words = ["lightcurve", "--satellite", box, *ORBIT, "--observer-norad", "44801", "--duration", "8",
+                     "--step", "1"]
+            phase = '{"law": "spin", "rate_body_deg_per_s": [45, 0, 0], "quaternion": [0, 0, 0, 1]}'
+            one = boresight(*words, "--attitude", phase, "--plot", plot)
+            self.assertEqual(one.returncode, 0, one.stderr)
+            self.assertEqual(one.stdout, boresight(*words, "--attitude", f"[{phase}]").stdout)
+            v = [row["v_mag"] for row in csv.DictReader(io.StringIO(one.stdout))]
+            for k in range(4):
+                self.assertLess(abs(float(v[k]) - float(v[k + 4])), 0.01)
+            self.assertGreater(len(set(v[:4])), 2)
+            with open(plot, encoding="utf-8") as file:
+                self.assertIn("<svg", file.read())
+
     def test_light_curve_of_a_scenario(self):
         shown = boresight("lightcurve", "scenarios/neossat_geo_track.json", "--duration", "60", "--step", "20")
         self.assertEqual(shown.returncode, 0, shown.stderr)
@@ -81,6 +101,9 @@ class Shapes(unittest.TestCase):
                 (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--observer-norad", "99998"], 1,
                  "lightcurve: --observer-norad 99998: "),
                 (["lightcurve", "scenarios/neossat_geo_track.json", "--object", "none"], 1, "--object none"),
+                (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--site", "1,1,1", "--attitude", "{1"], 1, "--attitude:1:2"),
+                (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--site", "1,1,1", "--attitude", '{"law": "up"}'], 1,
+                 "/world/objects/0/attitude/0/law"),
                 (["turntable"], 2, "one satellite is expected"),
                 (["turntable", "no.json"], 1, "no.json")):
             shown = boresight(*words)

@@ -509,7 +509,7 @@ static void a_made_up_silhouette(void **state) {
         made_up m = make_up(length, sun);
         m.s.edge = edge;
         bst_detection d;
-        bst_extended_measure(&m.config, &m.view, &m.s, &d);
+        bst_extended_measure(&m.config, &m.view, &m.s, 0.0, &d);
         double light[2] = {121 + 3 * 91.7, 61 + 3 * 40.2};
         double centre[2] = {121 + 3 * 90.0, 61 + 3 * 41.5};
         set_sun(&m, centre[0], centre[1]);

@@ -91,6 +91,16 @@ static void laws_point_their_axes(void **state) {
     bst_vec3 sun = bst_quat_rotate(q, s.sun);
     bst_assert_close(sun.y, 0, 1e-12);
     assert_true(sun.x > 0);
+    /* inertial: the axes of GCRF, wherever the body and the Sun are */
+    c.law = BST_ATTITUDE_INERTIAL;
+    q = attitude_at(&c, 1, &s);
+    bst_assert_close(fabs(q.w), 1, 1e-12);
+    c = (bst_attitude_config){
+        .from_s = -1e9, .law = BST_ATTITUDE_INERTIAL, .quaternion = {0.5, 0.5, 0.5, 0.5}};
+    q = attitude_at(&c, 1, &s);
+    bst_assert_close(
+        bst_vec3_angle(bst_quat_rotate(q, x), bst_quat_rotate((bst_quat){0.5, 0.5, 0.5, 0.5}, x)),
+        0, 1e-7);
     /* 90 degrees about x: what was y is now z, so that the body's y shows nadir */
     c = (bst_attitude_config){.from_s = -1e9, .law = BST_ATTITUDE_NADIR, .rotation_deg = {90}};
     back = bst_quat_conj(attitude_at(&c, 1, &s));

@@ -15,10 +15,13 @@ static const char model[] =
     "{\"name\": \"dish\", \"parent\": \"spun\", \"follows\": \"target\", \"axes\": 2,"
     " \"axis\": [1, 0, 0], \"normal\": [0, 0, 1], \"position_m\": [4, 5, 6]},"
     "{\"name\": \"boom\", \"follows\": \"burn\", \"axis\": [1, 0, 0], \"offset_deg\": 5,"
-    " \"rate_deg_per_s\": 2, \"turn_deg\": -50, \"burn\": 2}], "
-    "\"parts\": [" PLATE("array") ", " PLATE("spun") ", " PLATE("dish") ", " PLATE("boom") "]}";
+    " \"rate_deg_per_s\": 2, \"turn_deg\": -50, \"burn\": 2},"
+    "{\"name\": \"antenna\", \"follows\": \"earth\", \"axis\": [1, 0, 0]},"
+    "{\"name\": \"wing\", \"follows\": \"sun\", \"axes\": 2}], "
+    "\"parts\": [" PLATE("array") ", " PLATE("spun") ", " PLATE("dish") ", " PLATE(
+        "boom") ", " PLATE("antenna") ", " PLATE("wing") "]}";
 
-enum { ARRAY, SPUN, DISH, BOOM };
+enum { ARRAY, SPUN, DISH, BOOM, ANTENNA, WING };
 
 static bst_vec3 turned(const bst_test_model *m, int joint, bst_vec3 v) {
     return bst_mat3_mul_vec(&m->pose->rotation[joint], v);
@@ -83,11 +86,27 @@ static void at_a_burn(void **state) {
     bst_test_model_close(&m);
 }
 
+/* An antenna about x toward the Earth, a wing of two axes toward the Sun. */
+static void each_follows_its_own(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(model);
+    double a = 130 * BST_DEG_RAD;
+    bst_vec3 sun = bst_vec3_unit((bst_vec3){0.2, -0.7, -0.5}),
+             earth = bst_vec3_unit((bst_vec3){0.6, -sin(a), cos(a)});
+    bst_satellite_pose_set(m.pose,
+                           &(bst_satellite_aim){.sun = sun, .earth = earth, .target = {1, 0, 0}});
+    expect(turned(&m, ANTENNA, (bst_vec3){0, 0, 1}), 0, -sin(a), cos(a));
+    expect(turned(&m, ANTENNA, (bst_vec3){1, 0, 0}), 1, 0, 0);
+    expect(turned(&m, WING, (bst_vec3){0, 0, 1}), sun.x, sun.y, sun.z);
+    bst_test_model_close(&m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_within_limits),
         cmocka_unit_test(on_a_joint_that_spins),
         cmocka_unit_test(at_a_burn),
+        cmocka_unit_test(each_follows_its_own),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

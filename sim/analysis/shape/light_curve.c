@@ -33,8 +33,30 @@ static bst_status check_norad(bst_ctx *ctx, const bst_light_curve_request *r, co
                             : bst_fail_prefix(ctx, status, "%s %lld", option, (long long)norad);
 }
 
-/* JSON of a world with one satellite; NULL: out of memory. */
-static char *world_text(const bst_light_curve_request *r) {
+/* Attitude of a satellite without a scenario: the name of a law, or JSON as in scenarios. Returns
+ * *phases, which the caller frees; NULL: out of memory. */
+static bst_status read_attitude(bst_ctx *ctx, const char *text, cJSON **phases) {
+    if (*text != '[' && *text != '{') {
+        cJSON *phase = cJSON_CreateObject();
+        *phases = cJSON_CreateArray();
+        cJSON_AddStringToObject(phase, "law", text);
+        cJSON_AddItemToArray(*phases, phase);
+        return BST_OK;
+    }
+    bst_json *json = NULL;
+    BST_TRY(bst_json_parse(ctx, "--attitude", text, strlen(text), &json));
+    cJSON *given = cJSON_Duplicate(bst_json_root(json), true);
+    bst_json_free(json);
+    *phases = given;
+    if (cJSON_IsObject(given)) { /* one phase */
+        *phases = cJSON_CreateArray();
+        cJSON_AddItemToArray(*phases, given);
+    }
+    return BST_OK;
+}
+
+/* JSON of a world with one satellite, whose attitude becomes part of it; NULL: out of memory. */
+static char *world_text(const bst_light_curve_request *r, cJSON *attitude) {
     cJSON *root = cJSON_CreateObject(), *world = cJSON_AddObjectToObject(root, "world");
     cJSON *object = cJSON_CreateObject();
     cJSON_AddStringToObject(world, "star_catalogue", "embedded");
@@ -46,9 +68,7 @@ static char *world_text(const bst_light_curve_request *r) {
     cJSON_AddStringToObject(brightness, "model", "shape");
     cJSON_AddBoolToObject(brightness, "earthshine", r->earthshine);
     cJSON_AddStringToObject(cJSON_AddObjectToObject(object, "shape"), "file", r->satellite);
-    cJSON *phase = cJSON_CreateObject();
-    cJSON_AddStringToObject(phase, "law", r->attitude);
-    cJSON_AddItemToArray(cJSON_AddArrayToObject(object, "attitude"), phase);
+    cJSON_AddItemToObject(object, "attitude", attitude);
     cJSON_AddArrayToObject(root, "observers");
     if (r->observer_norad > 0) {
         cJSON *observer = cJSON_CreateObject();
@@ -88,7 +108,9 @@ static bst_status make_own_world(bst_ctx *ctx, bst_light_curve *c) {
     if (r->observer_norad > 0) {
         BST_TRY(check_norad(ctx, r, "--observer-norad", r->observer_norad));
     }
-    char *text = world_text(r);
+    cJSON *attitude = NULL;
+    BST_TRY(read_attitude(ctx, r->attitude, &attitude));
+    char *text = world_text(r, attitude);
     if (!text) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a world");
     }

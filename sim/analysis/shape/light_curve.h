@@ -7,7 +7,8 @@
 /* Object, observer and times of a light curve. */
 typedef struct bst_light_curve_request {
     /* a satellite without a scenario; satellite NULL: from the scenario */
-    const char *satellite, *elements, *attitude;
+    const char *satellite, *elements;
+    const char *attitude;          /* a law, or JSON: one phase, or phases as in scenarios */
     int64_t norad, observer_norad; /* observer_norad 0: none */
     bool earthshine;
     /* of a scenario: names; NULL: the first one */
