@@ -156,6 +156,48 @@ static void put_curves(FILE *o, const bst_pd_pair_result *r) {
     }
 }
 
+/* Marks the SNRs of a curve; many are left to gnuplot. */
+static void put_snr_marks(FILE *o, const bst_pd_pair_curve *c) {
+    enum { MOST_MARKS = 9 };
+    for (int i = 0; i < c->count && c->count <= MOST_MARKS; i++) {
+        fprintf(o, "%s%.9g%s", i ? ", " : "set xtics (", c->points[i].snr,
+                i + 1 < c->count ? "" : ")\n");
+    }
+}
+
+/* Sets a logarithmic axis of separations over all that is drawn in a panel, with marks at 1, 2 and
+ * 5. */
+static void set_separation_axis(FILE *o, const bst_pd_pair_result *r, int first, int end) {
+    double low = INFINITY, high = 0.0;
+    for (int c = first; c < end; c++) {
+        for (int i = 0; i < r->curves[c].count; i++) {
+            const bst_pd_pair_point *p = &r->curves[c].points[i];
+            low = fmin(low, fmin(p->bound.known_px, p->needed.snr)); /* fmin ignores NAN */
+            high = fmax(high, fmax(p->bound.unknown_px, p->needed.snr));
+        }
+    }
+    if (!(low < high)) {
+        low = 0.1 * r->fwhm_px;
+        high = 10.0 * r->fwhm_px;
+    }
+    low *= 0.8;
+    high *= 1.5;
+    fprintf(o, "set yrange [%.9g:%.9g]\nset ytics (", low, high);
+    const char *separator = "";
+    for (double decade = pow(10.0, floor(log10(low))); decade < high; decade *= 10.0) {
+        for (int k = 1; k <= 9; k++) {
+            bool is_minor = k == 4 || k == 6 || k > 7; /* without a label */
+            if (is_minor) {
+                fprintf(o, "%s'' %.9g 1", separator, decade * k);
+            } else {
+                fprintf(o, "%s'%.9g' %.9g", separator, decade * k, decade * k);
+            }
+            separator = ", ";
+        }
+    }
+    fputs(")\n", o);
+}
+
 /* Plots the separations of the curves first to end - 1 in one panel. */
 static void plot_separations(FILE *o, const bst_pd_pair_result *r, int first, int end) {
     const char *separator = "plot ";
@@ -195,10 +237,11 @@ bst_status bst_pd_pair_plot(bst_ctx *ctx, const char *path, const bst_pd_pair_re
     FILE *o = plot.script;
     put_curves(o, r);
     fprintf(o,
-            "set multiplot\nset grid linecolor rgb '#d8dde4'\nset lmargin 9\nset rmargin 2\n"
+            "set multiplot\nset grid linecolor rgb '#d8dde4'\nset lmargin 10\nset rmargin 2\n"
             "set logscale x\nset xrange [%.9g:%.9g]\n",
             0.85 * r->curves[0].points[0].snr,
             1.18 * r->curves[0].points[r->curves[0].count - 1].snr);
+    put_snr_marks(o, &r->curves[0]);
     for (int k = 0; k < panels; k++) {
         int first = k ? points : 0, end = k ? r->count : points;
         char kind[64] = "points";
@@ -208,16 +251,18 @@ bst_status bst_pd_pair_plot(bst_ctx *ctx, const char *path, const bst_pd_pair_re
         }
         fprintf(o,
                 "set size %.9g,0.68\nset origin %.9g,0.32\nset bmargin 0.8\nset tmargin 3\n"
-                "set format x ''\nunset xlabel\nset logscale y\nset autoscale y\n"
+                "set format x ''\nunset xlabel\nset logscale y\n"
                 "set ylabel 'separation found with probability 0.9 / px'\n"
                 "set key top right opaque samplen 2 spacing 1.1\n"
                 "set title \"%s; FWHM %.3g px\" font ',12' noenhanced\n",
                 1.0 / panels, 1.0 * k / panels, kind, r->fwhm_px);
+        set_separation_axis(o, r, first, end);
         plot_separations(o, r, first, end);
         fprintf(o,
                 "unset title\nset size %.9g,0.32\nset origin %.9g,0\nset tmargin 0.8\n"
                 "set bmargin 3.4\nset format x '%%g'\nset xlabel 'SNR of both sources'\n"
-                "unset logscale y\nset yrange [0:*]\nset ylabel 'single sources split'\n",
+                "unset logscale y\nset yrange [0:*]\nset ytics autofreq\nset ylabel 'single "
+                "sources split'\n",
                 1.0 / panels, 1.0 * k / panels);
         plot_splits(o, r, first, end);
     }
