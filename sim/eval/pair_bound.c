@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "boresight/vec.h"
+#include "sim/core/chi_square.h"
 #include "sim/core/symmetric.h"
 #include "sim/eval/detection_theory.h"
 
@@ -94,26 +95,10 @@ bst_status bst_pair_distance(bst_ctx *ctx, const bst_pair_image *image, const bs
     return BST_OK;
 }
 
-/* Tail beyond r of the length of a normal vector in three dimensions whose mean has the length d:
- * non-central chi-square with three degrees of freedom (Johnson, Kotz and Balakrishnan, Continuous
- * Univariate Distributions 2, 1995, eq. 29.11). */
-static double length_tail(double r, double d) {
-    const double density = 1.0 / sqrt(2.0 * BST_PI);
-    double slopes =
-        d > 1e-4 ? density * (exp(-0.5 * (r - d) * (r - d)) - exp(-0.5 * (r + d) * (r + d))) / d
-                 : 2.0 * density * r * exp(-0.5 * r * r);
-    return bst_eval_normal_tail(r - d) + bst_eval_normal_tail(r + d) + slopes;
-}
-
 bst_pair_pd bst_pair_pd_at(double distance, double rate) {
     assert(rate > 0.0 && rate < 1.0);
-    double low = 0.0, high = 40.0;
-    for (int step = 0; step < 50; step++) {
-        double middle = 0.5 * (low + high);
-        *(length_tail(middle, 0.0) > rate ? &low : &high) = middle;
-    }
     return (bst_pair_pd){bst_eval_normal_tail(bst_eval_normal_tail_inverse(rate) - distance),
-                         length_tail(low, distance)};
+                         bst_chi_square3_tail(bst_chi_square3_quantile(rate), distance)};
 }
 
 /* Means of both probabilities over directions and positions in the pixel. */
