@@ -112,7 +112,7 @@ static double chi_of_one(const pair_grid *p, const profile both[2], const double
 
 /* Errors in the fit of both sources. */
 typedef struct joint_errors {
-    double widen[2];    /* variance of each place over that in a fit of its own, mean of axes */
+    double widen[2];    /* variance of each place over that in a fit of its own, both axes */
     double separation2; /* variance of the separation, px^2 */
 } joint_errors;
 
@@ -147,7 +147,7 @@ static bool joint_fit(const pair_grid *p, const profile both[2], double s_px, do
             return false;
         }
         int x = ONE * s + 1, y = ONE * s + 2;
-        out->widen[s] = 0.5 * (inverse[x][x] / alone[1][1] + inverse[y][y] / alone[2][2]);
+        out->widen[s] = (inverse[x][x] + inverse[y][y]) / (alone[1][1] + alone[2][2]);
     }
     double apart = hypot(s_px, t_px), c = s_px / apart, n = t_px / apart;
     const double unit[BOTH] = {0.0, -c, -n, 0.0, c, n};

@@ -26,6 +26,8 @@ typedef struct outcome {
     double separated;  /* share of the pairs */
     double shift;      /* of what is seen as one, from the brighter towards the fainter, mean, px */
     double detections; /* per pair */
+    double log_variance; /* of stated positions in separated pairs: sum of logarithms, and number */
+    double places;
 } outcome;
 
 typedef struct pair {
@@ -72,13 +74,17 @@ static void count(outcome *o, const bst_detections *d, bst_rng_key key, uint64_t
         }
         pair p = pair_of(k, key, frame, i);
         int near = 0, at = -1;
+        double logs = 0.0;
         for (int n = 0; n < d->count; n++) {
             if (hypot(d->items[n].x_px - p.x, d->items[n].y_px - p.y) < 0.4 * PITCH) {
                 near++;
                 at = n;
+                logs += log(d->items[n].cov_xx + d->items[n].cov_yy);
             }
         }
         o->detections += (double)near / (pairs * frames);
+        o->log_variance += near > 1 ? logs : 0.0;
+        o->places += near > 1 ? near : 0.0;
         o->separated += near > 1 ? 1.0 / (pairs * frames) : 0.0;
         if (near == 1) {
             joined += 1.0;
@@ -209,8 +215,14 @@ static void pairs_are_split_as_in_images(void **state) {
         kind k = kinds[i];
         k.false_splits = 0.01;
         compare(&k, 90 + i, &image, &generated);
-        printf("flux %g ratio %g at %g px, streak %g: split %.3f, generator %.3f\n", k.flux_e,
-               k.ratio, k.distance, k.streak, image.separated, generated.separated);
+        double wider =
+            exp(generated.log_variance / generated.places - image.log_variance / image.places);
+        printf(
+            "flux %g ratio %g at %g px, streak %g: split %.3f, generator %.3f, its variance %.2f "
+            "of theirs\n",
+            k.flux_e, k.ratio, k.distance, k.streak, image.separated, generated.separated, wider);
+        /* one factor for both axes and the mean over many pairs */
+        assert_true(wider > 0.6 && wider < 1.8);
         /* 3.5 sigma of two counts of 270 pairs, and 0.1: the slope is 1 per 0.25 of the separation
          * of points, and the test is that of three parameters to 4 % of it */
         double p = 0.5 * (image.separated + generated.separated);
