@@ -221,8 +221,9 @@ static void pairs_are_split_as_in_images(void **state) {
             "flux %g ratio %g at %g px, streak %g: split %.3f, generator %.3f, its variance %.2f "
             "of theirs\n",
             k.flux_e, k.ratio, k.distance, k.streak, image.separated, generated.separated, wider);
-        /* one factor for both axes and the mean over many pairs */
-        assert_true(wider > 0.6 && wider < 1.8);
+        /* one factor for both axes; of pairs that are rarely split, images find those that noise
+         * puts farther apart, whose errors are smaller */
+        assert_true(wider > 0.6 && wider < (image.separated < 0.5 ? 2.5 : 1.7));
         /* 3.5 sigma of two counts of 270 pairs, and 0.1: the slope is 1 per 0.25 of the separation
          * of points, and the test is that of three parameters to 4 % of it */
         double p = 0.5 * (image.separated + generated.separated);
