@@ -214,9 +214,18 @@ static void plot_separations(FILE *o, const bst_pd_pair_result *r, int first, in
     fputs("\n", o);
 }
 
+/* Plots the shares of single sources that are split, with room for the key above. */
 static void plot_splits(FILE *o, const bst_pd_pair_result *r, int first, int end) {
-    fprintf(o, "plot %.9g with lines linecolor rgb '#6b7787' title 'stated'",
-            r->bound_false_splits);
+    double high = r->bound_false_splits;
+    for (int c = first; c < end; c++) {
+        for (int i = 0; i < r->curves[c].count; i++) {
+            const bst_pd_pair_point *p = &r->curves[c].points[i];
+            bst_eval_interval w = bst_eval_wilson_interval(p->split, p->singles, BST_NORMAL_95);
+            high = fmax(high, w.high);
+        }
+    }
+    fprintf(o, "set yrange [0:%.9g]\nplot %.9g with lines linecolor rgb '#6b7787' title 'stated'",
+            1.35 * high, r->bound_false_splits);
     for (int c = first; c < end; c++) {
         fprintf(o,
                 ", $c%d using 1:6:7:8 with yerrorbars pointtype 7 pointsize 0.7 linecolor rgb "
@@ -261,7 +270,7 @@ bst_status bst_pd_pair_plot(bst_ctx *ctx, const char *path, const bst_pd_pair_re
         fprintf(o,
                 "unset title\nset size %.9g,0.32\nset origin %.9g,0\nset tmargin 0.8\n"
                 "set bmargin 3.4\nset format x '%%g'\nset xlabel 'SNR of both sources'\n"
-                "unset logscale y\nset yrange [0:*]\nset ytics autofreq\nset ylabel 'single "
+                "unset logscale y\nset ytics autofreq\nset ylabel 'single "
                 "sources split'\n",
                 1.0 / panels, 1.0 * k / panels);
         plot_splits(o, r, first, end);
