@@ -11,6 +11,7 @@ enum {
     REACH_PX = 12,
     POWER_REACH_PX = 7, /* light beyond this contributes less than 2e-4 to the sum of squares */
     PATH_PER_PX = 2,
+    EXACT_PATH_PER_PX = 4,                  /* of shares at exact places */
     SIDE = 2 * PER_PX * (REACH_PX + 1) + 1, /* one more pixel for differences */
 };
 
@@ -183,7 +184,7 @@ void bst_pd_image_shares(const bst_pd_image *m, const bst_eval_match_target *pla
     mix nodes;
     nodes.count = bst_psf_weights(m->psf, place->x_px, place->y_px, nodes.node, nodes.weight);
     double length = hypot(place->dx_px, place->dy_px);
-    int parts = length > 0.0 ? (int)ceil(length * PATH_PER_PX) : 1;
+    int parts = length > 0.0 ? (int)ceil(length * EXACT_PATH_PER_PX) : 1;
     for (int k = 0; k < parts; k++) {
         double u = (k + 0.5) / parts - 0.5;
         for (int n = 0; n < nodes.count; n++) {
