@@ -121,23 +121,22 @@ static bst_status mean_pd(bst_ctx *ctx, const bst_pair_image *image, bst_close_p
     return BST_OK;
 }
 
-bst_status bst_pair_separations_at(bst_ctx *ctx, const bst_pair_image *image, double flux_e,
-                                   double ratio, const bst_eval_bound_noise *noise, double rate,
-                                   double pd, bst_pair_separations *out) {
-    assert(image && noise && out && rate > 0.0 && rate < pd && pd < 1.0);
-    const bst_close_pair pair = {.flux_e = flux_e, .ratio = ratio};
+bst_status bst_pair_separations_at(bst_ctx *ctx, const bst_pair_image *image,
+                                   const bst_close_pair *pair, const bst_eval_bound_noise *noise,
+                                   double rate, double pd, bst_pair_separations *out) {
+    assert(image && pair && noise && out && rate > 0.0 && rate < pd && pd < 1.0);
     double *const results[2] = {&out->known_px, &out->unknown_px};
     for (int which = 0; which < 2; which++) {
         double low = 0.0, high = image->largest_apart_px;
         bst_pair_pd at;
-        BST_TRY(mean_pd(ctx, image, pair, high, noise, rate, &at));
+        BST_TRY(mean_pd(ctx, image, *pair, high, noise, rate, &at));
         if (!((which ? at.unknown : at.known) > pd)) {
             *results[which] = NAN;
             continue;
         }
         for (int step = 0; step < BISECTIONS; step++) {
             double middle = 0.5 * (low + high);
-            BST_TRY(mean_pd(ctx, image, pair, middle, noise, rate, &at));
+            BST_TRY(mean_pd(ctx, image, *pair, middle, noise, rate, &at));
             *((which ? at.unknown : at.known) > pd ? &high : &low) = middle;
         }
         *results[which] = 0.5 * (low + high);

@@ -33,32 +33,35 @@ typedef struct bst_close_pair {
 bst_status bst_pair_distance(bst_ctx *ctx, const bst_pair_image *image, const bst_close_pair *pair,
                              const bst_eval_bound_noise *noise, double *distance) BST_MUST_CHECK;
 
-/* Highest probability at which a test finds a pair at the distance D from one source, if it splits
- * a share `rate` of single sources.
- *
- * Returned:  known: Q(Q^-1(rate) - D), separation, direction and ratio are known (Neyman and
- *            Pearson 1933, Phil. Trans. A 231, 289)
- *            unknown: three parameters more than those of one source are estimated: the tail of
- *            non-central chi-square with three degrees of freedom and non-centrality D^2 beyond the
- *            quantile 1 - rate of the central one */
+/* Probabilities of detection of a pair. */
 typedef struct bst_pair_pd {
-    double known, unknown;
+    double known;   /* separation, direction and ratio are known to the test */
+    double unknown; /* three parameters more than those of one source are estimated */
 } bst_pair_pd;
+
+/* Highest probability at which a test finds a pair at the distance D from one source, if it splits
+ * a share `rate` of single sources, 0 < rate < 1.
+ *
+ * Returned:  known: Q(Q^-1(rate) - D) (Neyman and Pearson 1933, Phil. Trans. A 231, 289); unknown:
+ *            the tail of non-central chi-square with three degrees of freedom and non-centrality
+ *            D^2 beyond the quantile 1 - rate of the central one */
 bst_pair_pd bst_pair_pd_at(double distance, double rate);
 
-/* Separations at which those probabilities, as means over directions and positions in the pixel,
- * are pd.
- *
- * Given:     flux_e  of both sources
- *            ratio   of their brightness
- *            rate    share of single sources that are split, 0 < rate < pd
- * Returned:  px; NAN: not within image->largest_apart_px
- * Errors:    BST_ERR_MEMORY */
+/* Separations at which those probabilities have a value, px; NAN: not within
+ * bst_pair_image.largest_apart_px. */
 typedef struct bst_pair_separations {
     double known_px, unknown_px;
 } bst_pair_separations;
-bst_status bst_pair_separations_at(bst_ctx *ctx, const bst_pair_image *image, double flux_e,
-                                   double ratio, const bst_eval_bound_noise *noise, double rate,
-                                   double pd, bst_pair_separations *out) BST_MUST_CHECK;
+
+/* Finds the separations at which the means of both probabilities over directions and positions in
+ * the pixel are pd.
+ *
+ * Given:     pair  its flux and ratio; place and separation are not read
+ *            rate  share of single sources that are split, 0 < rate < pd < 1
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_pair_separations_at(bst_ctx *ctx, const bst_pair_image *image,
+                                   const bst_close_pair *pair, const bst_eval_bound_noise *noise,
+                                   double rate, double pd,
+                                   bst_pair_separations *out) BST_MUST_CHECK;
 
 #endif

@@ -30,22 +30,21 @@ static void test_lists(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     double out[3] = {7.0, 7.0, 7.0};
-    int count = 0;
-    bst_assert_ok(&ctx, bst_pd_list_read(&ctx, "ratio", "1,2.5,4", 1.0, 9.0, 3, out, &count));
-    assert_true(count == 3 && out[0] == 1.0 && out[1] == 2.5 && out[2] == 4.0);
-    bst_assert_ok(&ctx, bst_pd_list_read(&ctx, "ratio", "9", 1.0, 9.0, 3, out, &count));
-    assert_true(count == 1 && out[0] == 9.0 && out[1] == 2.5);
+    bst_pd_list list = {"ratio", 1.0, 9.0, out, 3, 0};
+    bst_assert_ok(&ctx, bst_pd_list_read(&ctx, "1,2.5,4", &list));
+    assert_true(list.count == 3 && out[0] == 1.0 && out[1] == 2.5 && out[2] == 4.0);
+    bst_assert_ok(&ctx, bst_pd_list_read(&ctx, "9", &list));
+    assert_true(list.count == 1 && out[0] == 9.0 && out[1] == 2.5);
     static const char *const wrong[] = {"",      ",",     "1,",   ",1",     "1,,2",    "1;2",
                                         "a",     "1,nan", "inf",  "1e999",  "0.9",     "9.1",
                                         "2,1",   "1,1",   "1 ,2", "1,2x",   "1,2,3,4", "-1",
                                         "1:2:1", "1,2,",  "0x",   "1,2,3,", "1e-400,2"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        if (bst_pd_list_read(&ctx, "ratio", wrong[i], 1.0, 9.0, 3, out, &count) !=
-            BST_ERR_ARGUMENT) {
+        if (bst_pd_list_read(&ctx, wrong[i], &list) != BST_ERR_ARGUMENT) {
             fail_msg("\"%s\" is taken", wrong[i]);
         }
         assert_non_null(strstr(ctx.message, "--ratio"));
-        assert_true(count == 1 && out[0] == 9.0);
+        assert_true(list.count == 1 && out[0] == 9.0);
     }
 }
 

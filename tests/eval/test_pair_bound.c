@@ -117,13 +117,14 @@ static void separations(void **state) {
     const double root = sqrt(4.0 * BST_PI * (SIGMA_PX * SIGMA_PX + 1.0 / 12.0));
     bst_pair_image image = image_of(&d, 0.0);
     const double snr = 40.0, flux = snr * 5.0 * root;
+    const bst_close_pair equal = {.flux_e = flux, .ratio = 1.0},
+                         faint = {.flux_e = 0.5 * flux, .ratio = 4.0};
     bst_pair_separations out;
-    bst_assert_ok(&ctx, bst_pair_separations_at(&ctx, &image, flux, 1.0, &noise, 0.01, 0.9, &out));
+    bst_assert_ok(&ctx, bst_pair_separations_at(&ctx, &image, &equal, &noise, 0.01, 0.9, &out));
     bst_assert_close(snr * closed_form(1.0, out.known_px), 3.6079, 5e-3);
     bst_assert_close(snr * closed_form(1.0, out.unknown_px), 4.3873, 5e-3);
     /* too faint: D is at most 20 sqrt(0.2^2 + 0.8^2 - 0.8^2) = 4 at any distance */
-    bst_assert_ok(&ctx,
-                  bst_pair_separations_at(&ctx, &image, 0.5 * flux, 4.0, &noise, 0.01, 0.9, &out));
+    bst_assert_ok(&ctx, bst_pair_separations_at(&ctx, &image, &faint, &noise, 0.01, 0.9, &out));
     assert_true(isfinite(out.known_px) && isnan(out.unknown_px));
 }
 

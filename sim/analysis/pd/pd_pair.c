@@ -77,8 +77,9 @@ bst_status bst_pd_pair_bound(bst_ctx *ctx, const bst_pd_scene *s, double snr, do
     double excess = bst_camera_excess_noise(c);
     double flux = snr * s->noise_e / excess / sqrt(bst_pd_sharpness(s, &place));
     const bst_eval_bound_noise noise = {s->noise_e / excess, true};
+    const bst_close_pair pair = {.flux_e = flux, .ratio = ratio};
     bst_status status =
-        bst_pair_separations_at(ctx, &image, flux, ratio, &noise, false_splits, ASKED_PD, out);
+        bst_pair_separations_at(ctx, &image, &pair, &noise, false_splits, ASKED_PD, out);
     free(d.region.work);
     return status;
 }

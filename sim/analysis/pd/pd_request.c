@@ -200,34 +200,34 @@ bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *text, d
     return BST_OK;
 }
 
-bst_status bst_pd_list_read(bst_ctx *ctx, const char *name, const char *text, double low,
-                            double high, int most, double *out, int *count) {
+bst_status bst_pd_list_read(bst_ctx *ctx, const char *text, bst_pd_list *list) {
     double v[BST_PD_POINTS];
     const char *at = text;
     int n = 0;
-    assert(most <= BST_PD_POINTS);
+    assert(list->most <= BST_PD_POINTS);
     for (bool more = true; more; at += more) {
         char *end;
         double value = strtod(at, &end);
         more = *end == ',';
         if (end == at || !isfinite(value) || (!more && *end != '\0')) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
-                            "--%s \"%s\" is not a list of numbers, for example 1,4", name, text);
+                            "--%s \"%s\" is not a list of numbers, for example 1,4", list->name,
+                            text);
         }
-        if (!(value >= low && value <= high) || (n > 0 && value <= v[n - 1])) {
+        if (!(value >= list->low && value <= list->high) || (n > 0 && value <= v[n - 1])) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
-                            "--%s \"%s\": numbers from %g to %g, each above the one before", name,
-                            text, low, high);
+                            "--%s \"%s\": numbers from %g to %g, each above the one before",
+                            list->name, text, list->low, list->high);
         }
-        if (n == most) {
-            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s \"%s\" has more than %d numbers", name,
-                            text, most);
+        if (n == list->most) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s \"%s\" has more than %d numbers",
+                            list->name, text, list->most);
         }
         v[n++] = value;
         at = end;
     }
-    memcpy(out, v, (size_t)n * sizeof *v);
-    *count = n;
+    memcpy(list->values, v, (size_t)n * sizeof *v);
+    list->count = n;
     return BST_OK;
 }
 
@@ -235,8 +235,10 @@ bst_status bst_pd_list_read(bst_ctx *ctx, const char *name, const char *text, do
 static bst_status read_pair_snrs(bst_ctx *ctx, const char *text, bst_pd_request *r) {
     bst_pd_pair_options *p = &r->pairs;
     if (!strchr(text, ':')) {
-        return bst_pd_list_read(ctx, "snr", text, LEAST_PAIR_SNR, 1e4, BST_PD_PAIR_SNRS, p->snr,
-                                &p->snrs);
+        bst_pd_list list = {"snr", LEAST_PAIR_SNR, 1e4, p->snr, BST_PD_PAIR_SNRS, 0};
+        BST_TRY(bst_pd_list_read(ctx, text, &list));
+        p->snrs = list.count;
+        return BST_OK;
     }
     bst_pd_options range;
     BST_TRY(bst_pd_range_read(ctx, "snr", text, LEAST_PAIR_SNR, 1e4, &range));
@@ -274,11 +276,15 @@ static bst_status settle_pairs(bst_ctx *ctx, bst_pd_request *r) {
     o->trials = o->trials > 0 ? o->trials : 300;
     BST_TRY(read_pair_snrs(ctx, r->range ? r->range : "20,50,100,200", r));
     if (r->separations) {
-        BST_TRY(bst_pd_list_read(ctx, "separation", r->separations, 0.01, 1000.0,
-                                 BST_PD_PAIR_SEPARATIONS, p->separation_px, &p->separations));
+        bst_pd_list list = {
+            "separation", 0.01, 1000.0, p->separation_px, BST_PD_PAIR_SEPARATIONS, 0};
+        BST_TRY(bst_pd_list_read(ctx, r->separations, &list));
+        p->separations = list.count;
     }
-    return bst_pd_list_read(ctx, "ratio", r->ratios ? r->ratios : "1,4", 1.0, 1000.0,
-                            BST_PD_PAIR_RATIOS, p->ratio, &p->ratios);
+    bst_pd_list list = {"ratio", 1.0, 1000.0, p->ratio, BST_PD_PAIR_RATIOS, 0};
+    BST_TRY(bst_pd_list_read(ctx, r->ratios ? r->ratios : "1,4", &list));
+    p->ratios = list.count;
+    return BST_OK;
 }
 
 /* Reads what a measurement over SNR or magnitude takes. */

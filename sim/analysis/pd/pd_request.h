@@ -42,14 +42,19 @@ extern const bst_option bst_pd_option_table[];
 bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *text, double low,
                              double high, bst_pd_options *out) BST_MUST_CHECK;
 
-/* Reads ascending numbers such as "20,50,100".
+/* A list of an option. */
+typedef struct bst_pd_list {
+    const char *name; /* of the option, for messages */
+    double low, high; /* least and greatest value allowed */
+    double *values;   /* [most], lent */
+    int most, count;
+} bst_pd_list;
+
+/* Reads ascending numbers such as "20,50,100" into list->values and list->count.
  *
- * Given:     name       of the option, for messages
- *            low, high  least and greatest value allowed
- *            most       room in `out`
- * Errors:    BST_ERR_ARGUMENT: not such a list, out of range, not ascending, or too long */
-bst_status bst_pd_list_read(bst_ctx *ctx, const char *name, const char *text, double low,
-                            double high, int most, double *out, int *count) BST_MUST_CHECK;
+ * Errors:    BST_ERR_ARGUMENT: not such a list, out of range, not ascending, or too long; the
+ *            values stay as they are */
+bst_status bst_pd_list_read(bst_ctx *ctx, const char *text, bst_pd_list *list) BST_MUST_CHECK;
 
 /* Reads the texts of the request into request->options and checks that its options fit together.
  *
