@@ -401,7 +401,8 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
     bst_generator_set_filters(g); /* amplitudes depend on the threshold */
     for (int i = 0; i < t->count; i++) {
         generator_source *s = &g->sources[g->source_count];
-        *s = (generator_source){.item = i, .star = t->items[i].kind == BST_SOURCE_STAR, .head = -1};
+        *s = (generator_source){
+            .item = i, .star = t->items[i].kind == BST_SOURCE_STAR, .head = -1, .partner = -1};
         bst_generator_set_image(g, t, s);
         int of = f->ghost ? f->ghost[i] : -1; /* each ghost of a source has draws of its own */
         s->name = (uint64_t)t->items[i].id | (uint64_t)(t->items[i].kind & 3) << 32 |
@@ -515,6 +516,9 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             (f->truth->items[g->sources[i].item].flags & BST_TRUTH_SATURATED) != 0;
     }
     bst_generator_decide(g);
+    if (g->settings.false_splits > 0.0 && !g->smeared) {
+        bst_generator_split_pairs(g);
+    }
     if (!f->response) { /* both Gaussian */
         bst_generator_adapt_width(g);
     }

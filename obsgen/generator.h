@@ -17,7 +17,8 @@ typedef struct bst_generator_settings {
     double jitter_px; /* RMS jitter per axis, sensor px, that widens the onboard PSF */
     double streak_min_px, streak_max_px; /* star streaks for which a streak filter is used */
     int mesh_px;                         /* side of a mesh of background and noise, px; 0: 64 */
-    int column_correction;               /* see sim/optics/column_level.h */
+    double false_splits; /* share of single sources that the pair test may split; 0: no pair test */
+    int column_correction; /* see sim/optics/column_level.h */
 } bst_generator_settings;
 
 /* A generated detection and its origin. */

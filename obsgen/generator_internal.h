@@ -35,6 +35,8 @@ typedef struct generator_source {
     double point_flux;       /* uneven path: light that a point fit to it finds, of the whole */
     uint64_t name;           /* stream of its random draws */
     int item, head;          /* head: source with which it is merged; -1: none */
+    int partner;             /* the other source of a pair that the pair test found; -1: none */
+    double partner_widen;    /* variance factor of its position by the fit of both */
     bool star, as_streak, found, saturated;
     bool broken; /* longer than is filtered for: detected in fragments */
 } generator_source;
@@ -215,6 +217,10 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
                              const generator_source *faint);
 /* Decides which sources are detected and which are merged with a brighter one. */
 void bst_generator_decide(bst_generator *g);
+/* Finds pairs among the merged sources as the pair test of image processing does; after
+ * bst_generator_decide, with settings.false_splits > 0. Single sources that noise splits are not
+ * generated. */
+void bst_generator_split_pairs(bst_generator *g);
 /* SNR per electron of a fit with the PSF that image processing knows.
  *
  * Given:     length_px  of the fitted streak; 0: a point

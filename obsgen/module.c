@@ -27,7 +27,7 @@ typedef struct obsgen_config {
     double star_limit_v_mag, margin_px;
     int64_t truth_capacity, capacity, mesh_px;
     double false_alarms_per_frame, jitter_px, streak_min_px, streak_max_px, search_radius_px,
-        match_tolerance_px;
+        false_splits, match_tolerance_px;
     int column_correction, attitude;
     int64_t lost_after_frames;
 } obsgen_config;
@@ -51,6 +51,9 @@ static const bst_config_desc config_table[] = {
             "Detections kept per frame, the brightest first" OF_OTHERS "."),
     BST_REAL(obsgen_config, false_alarms_per_frame, "", 1e-6, 1e4, "1",
              "Detections per frame that noise alone may cause, on average" OF_OTHERS "."),
+    BST_REAL(obsgen_config, false_splits, "", 0, 0.1, "0",
+             "Share of single sources that the test for close pairs may split; 0: no such "
+             "test" OF_OTHERS "."),
     BST_REAL(obsgen_config, jitter_px, "px", 0, 5, "0",
              "RMS per axis of the line-of-sight jitter that widens the onboard PSF" OF_OTHERS "."),
     BST_REAL(obsgen_config, streak_min_px, "px", 0.5, 100, "1.5",
@@ -169,6 +172,7 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
     }
     const bst_generator_settings settings = {.capacity = (int)c->capacity,
                                              .false_alarms_per_frame = c->false_alarms_per_frame,
+                                             .false_splits = c->false_splits,
                                              .jitter_px = c->jitter_px,
                                              .streak_min_px = c->streak_min_px,
                                              .streak_max_px = c->streak_max_px,

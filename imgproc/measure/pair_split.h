@@ -23,10 +23,7 @@ typedef struct bst_pair {
 bool bst_pair_fit(const bst_imgproc_worker *w, int i, double widening_px2, double least_gain,
                   bst_pair *out);
 
-/* Gain that a share `rate` of single sources exceeds by noise. */
-double bst_pair_least_gain(double rate);
-
-/* Replaces fitted sources of the frame by two where the likelihood ratio says so; at most a share
+/* Replaces fitted sources of the frame by two where the likelihood ratio says so; about a share
  * `rate` of the single ones. Both are then flagged as a blend. */
 void bst_pair_split(bst_imgproc_locator *locator, const bst_locate_frame *frame, int fits,
                     double rate);

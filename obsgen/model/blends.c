@@ -308,7 +308,8 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             beside += o->amplitude * share;
             out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
             /* both fluxes and positions are free, so their common part is undetermined */
-            out.widen *= 1.0 / fmax(1.0 - share * share, LEAST_OWN);
+            out.widen *=
+                s->partner == k ? s->partner_widen : 1.0 / fmax(1.0 - share * share, LEAST_OWN);
         } else {
             count = add_merged(g, s, o, merged, count);
         }

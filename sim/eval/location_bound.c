@@ -47,7 +47,7 @@ void bst_location_bound_along(const bst_location_bound *bound, double dx, double
     out[1] = s * s * xx - 2.0 * c * s * xy + c * c * yy;
 }
 
-/* Gaussian image and its derivatives on a rectangle of pixels. */
+/* Gaussian image and its derivatives on a rectangle of pixels; by_x, by_y NULL: not computed. */
 typedef struct image {
     int x0, y0, width, height, pixels;
     double *share, *by_x, *by_y;         /* [height][width] */
@@ -86,6 +86,8 @@ static void add_node(image *m, double x, double y, double sigma, double weight) 
         size_t row = (size_t)j * (size_t)m->width;
         for (int i = x1; i <= x2; i++) {
             m->share[row + (size_t)i] += s * m->row_share[i];
+        }
+        for (int i = x1; i <= x2 && m->by_x; i++) {
             m->by_x[row + (size_t)i] += s * m->row_slope[i];
             m->by_y[row + (size_t)i] += d * m->row_share[i];
         }
@@ -171,4 +173,20 @@ bst_status bst_eval_gaussian_powers(bst_ctx *ctx, const bst_eval_bound_source *s
     }
     free(m.memory);
     return BST_OK;
+}
+
+void bst_eval_gaussian_shares(const bst_eval_bound_source *source, const bst_eval_region *r,
+                              double *share) {
+    image m = {.x0 = r->x0,
+               .y0 = r->y0,
+               .width = r->width,
+               .height = r->height,
+               .pixels = r->width * r->height,
+               .share = share,
+               .row_share = r->work,
+               .row_slope = r->work + r->width,
+               .column_share = r->work + 2 * (size_t)r->width,
+               .column_slope = r->work + 2 * (size_t)r->width + r->height};
+    memset(share, 0, (size_t)m.pixels * sizeof *share);
+    integrate_streak(&m, source);
 }

@@ -61,6 +61,19 @@ bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_eval_bound_source
                                        const bst_eval_bound_noise *noise, double margin_px,
                                        bst_location_bound *out) BST_MUST_CHECK;
 
+/* A rectangle of pixels. */
+typedef struct bst_eval_region {
+    int x0, y0, width, height;
+    double *work; /* [2 (width + height)], lent */
+} bst_eval_region;
+
+/* Fractions of the light of a Gaussian streak in the pixels of a region, as in
+ * bst_location_bound_gaussian.
+ *
+ * Returned:  share  [height][width] */
+void bst_eval_gaussian_shares(const bst_eval_bound_source *source, const bst_eval_region *region,
+                              double *share);
+
 /* Position variances along and across the direction (dx, dy), px^2: out = {along, across}. Length
  * 0: the x axis. */
 void bst_location_bound_along(const bst_location_bound *bound, double dx, double dy, double out[2]);

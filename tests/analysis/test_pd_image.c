@@ -62,7 +62,38 @@ static void powers_and_bounds(void **state) {
     bst_psf_free(psf);
 }
 
+/* Shares at exact places: no sixteenths. */
+static void shares(void **state) {
+    (void)state;
+    enum { SIDE = 25 };
+    bst_ctx ctx = {0};
+    bst_psf *psf = gaussian();
+    bst_pd_image *image;
+    bst_assert_ok(&ctx, bst_pd_image_create(&ctx, psf, 9.0, &image));
+    static const bst_eval_match_target exact[] = {{100.013, 49.977, 0, 0},
+                                                  {99.541, 50.272, 0, 0},
+                                                  {100.303, 50.111, 4, -3},
+                                                  {100.4999, 49.5001, 0, 6}};
+    for (size_t i = 0; i < sizeof exact / sizeof *exact; i++) {
+        const bst_eval_match_target *p = &exact[i];
+        double work[4 * SIDE], truth[SIDE * SIDE], got[SIDE * SIDE];
+        const bst_eval_region region = {88, 38, SIDE, SIDE, work};
+        const bst_eval_bound_source source = {p->x_px, p->y_px, p->dx_px, p->dy_px, SIGMA_PX, 1};
+        bst_eval_gaussian_shares(&source, &region, truth);
+        bst_pd_image_shares(image, p, region.x0, region.y0, SIDE, SIDE, got);
+        for (int k = 0; k < SIDE * SIDE; k++) {
+            /* cubic interpolation over sixteenths of a pixel: (1/16)^4 / 24 of a fourth derivative
+             * of 0.4; of streaks the midpoint rule at their ends: (1/4)^2 / 24 of a slope of 0.03
+             */
+            bst_assert_close(got[k], truth[k], i < 2 ? 1e-6 : 1e-4);
+        }
+    }
+    bst_pd_image_free(image);
+    bst_psf_free(psf);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(powers_and_bounds)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(powers_and_bounds),
+                                       cmocka_unit_test(shares)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,6 +26,28 @@ static void test_ranges(void **state) {
     assert_int_equal(bst_pd_range_read(&ctx, "snr", "1:201:1", 0.1, 1e4, &o), BST_ERR_ARGUMENT);
 }
 
+static void test_lists(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    double out[3] = {7.0, 7.0, 7.0};
+    bst_pd_list list = {"ratio", 1.0, 9.0, out, 3, 0};
+    bst_assert_ok(&ctx, bst_pd_list_read(&ctx, "1,2.5,4", &list));
+    assert_true(list.count == 3 && out[0] == 1.0 && out[1] == 2.5 && out[2] == 4.0);
+    bst_assert_ok(&ctx, bst_pd_list_read(&ctx, "9", &list));
+    assert_true(list.count == 1 && out[0] == 9.0 && out[1] == 2.5);
+    static const char *const wrong[] = {"",      ",",     "1,",   ",1",     "1,,2",    "1;2",
+                                        "a",     "1,nan", "inf",  "1e999",  "0.9",     "9.1",
+                                        "2,1",   "1,1",   "1 ,2", "1,2x",   "1,2,3,4", "-1",
+                                        "1:2:1", "1,2,",  "0x",   "1,2,3,", "1e-400,2"};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        if (bst_pd_list_read(&ctx, wrong[i], &list) != BST_ERR_ARGUMENT) {
+            fail_msg("\"%s\" is taken", wrong[i]);
+        }
+        assert_non_null(strstr(ctx.message, "--ratio"));
+        assert_true(list.count == 1 && out[0] == 9.0);
+    }
+}
+
 /* Reads a command line as the command does. */
 static bst_status read_line(bst_ctx *ctx, bst_pd_request *r, const char *a, const char *b,
                             const char *c, const char *d) {
@@ -42,7 +64,7 @@ static bst_status read_line(bst_ctx *ctx, bst_pd_request *r, const char *a, cons
     bst_options_bind(bst_pd_option_table, r, table);
     bst_assert_ok(ctx, bst_options_parse(ctx, table, argc, argv, &arguments));
     bst_status status = bst_pd_request_settle(ctx, r, table);
-    r->range = r->magnitudes = NULL; /* of words */
+    r->range = r->magnitudes = r->ratios = r->separations = NULL; /* of words */
     r->load.table = NULL;
     return status;
 }
@@ -55,6 +77,12 @@ static void test_defaults(void **state) {
     assert_true(r.options.low == 2.0 && r.options.high == 12.0 && r.options.step == 0.5);
     assert_false(r.options.by_magnitude);
     assert_int_equal(r.options.trials, 1000);
+    bst_assert_ok(&ctx, read_line(&ctx, &r, "--pair", NULL, NULL, NULL));
+    assert_true(r.pairs.snrs == 4 && r.pairs.snr[3] == 200.0 && r.pairs.ratios == 2);
+    assert_true(r.pairs.separations == 0 && r.options.trials == 300);
+    assert_true(r.options.false_splits == -1.0); /* the scenario's */
+    bst_assert_ok(&ctx, read_line(&ctx, &r, "--pair", "--snr=20:60:20", "--separation=1,2", NULL));
+    assert_true(r.pairs.snrs == 3 && r.pairs.snr[1] == 40.0 && r.pairs.separation_px[1] == 2.0);
     bst_assert_ok(&ctx, read_line(&ctx, &r, "--stack", "8", "--threads=3", NULL));
     assert_true(r.options.high == 2.4); /* a stack finds what is fainter */
     assert_int_equal(r.options.threads, 3);
@@ -88,6 +116,7 @@ static void test_what_does_not_go_together(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_ranges),
+        cmocka_unit_test(test_lists),
         cmocka_unit_test(test_defaults),
         cmocka_unit_test(test_what_does_not_go_together),
     };

@@ -4,6 +4,7 @@ the detector is near its bounds, results repeat, wrong calls are explained.
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_pd.py BORESIGHT [--full]
 """
 import json
+import math
 import os
 import statistics
 import sys
@@ -166,6 +167,110 @@ class Measured(unittest.TestCase):
         self.assertGreater(known[0]["pd"], gaussian[0]["pd"] + 0.02)
 
 
+class Pairs(unittest.TestCase):
+    """`--pair`: half a megapixel has 392 cells with 79 pairs a frame."""
+    SMALL = ["--threads", "1", "--set", runs.SENSOR + "/camera/width_px=1024", "--set",
+             runs.SENSOR + "/camera/height_px=512"]
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+        cls.plot = os.path.join(cls.folder, "pair.png")
+        cls.path = os.path.join(cls.folder, "pair.json")
+        cls.words = ["--pair", "--snr", "50", "--ratio", "1,4", "--streak", "8", "--trials", "60",
+                     "--false-splits", "0.01", "--json", cls.path, *cls.SMALL]
+        cls.result = pd(*cls.words, "--plot", cls.plot)
+        assert cls.result.returncode == 0, cls.result.stderr
+        with open(cls.path) as file:
+            cls.out = json.load(file)
+
+    def test_curves(self):
+        self.assertEqual([(c["ratio"], c["streak_px"]) for c in self.out["curves"]],
+                         [(1, 0), (4, 0), (1, 8), (4, 8)])
+        self.assertEqual(self.out["bound_false_splits"], 0.01)
+        for curve in self.out["curves"]:
+            point, = curve["points"]
+            self.assertEqual([s["pairs"] for s in point["separations"]], [60] * 9)
+            # 4 of 5 targets are single
+            self.assertGreaterEqual(point["singles"], 4 * 9 * 60)
+            # 1 % asked for; six standard deviations of 2,160 more
+            self.assertLess(point["false_splits"], 0.01 + 6 * 0.0021)
+            self.assertLess(point["separations"][0]["pd"], 0.85)
+            self.assertGreater(point["separations"][-1]["pd"], 0.9)
+            self.assertLess(point["bound_known_px"], point["bound_unknown_px"])
+
+    def pd_of_known_pair(self, separation):
+        """Q(Q^-1(0.01) - D) as a mean over directions and phases: equal points of SNR 50, the Gaussian
+        in pixels by erf, own light as noise, the nearest single source by Gauss-Newton."""
+        sigma, noise = self.out["fwhm_px"] / 2.354820045, self.out["noise_e"]
+        edges = np.arange(-12, 13) - 0.5
+        erf = np.vectorize(math.erf)
+
+        def image(x, y):
+            u, v = (np.diff(erf((edges - at) / sigma / math.sqrt(2))) / 2 for at in (x, y))
+            return np.outer(v, u).ravel()
+
+        flux = 50 * noise / np.sqrt(np.sum(image(0, 0)**2))
+        found = []
+        for k in range(6):
+            x, y, angle = k / 6, (0.4 * k) % 1, 0.3 + k * math.pi / 6
+            dx, dy = separation / 2 * math.cos(angle), separation / 2 * math.sin(angle)
+            pair = flux / 2 * (image(x - dx, y - dy) + image(x + dx, y + dy))
+            weight = 1 / np.sqrt(noise**2 + pair)
+            p = np.array([flux, x, y])
+            for _ in range(6):
+                rest = pair - p[0] * image(p[1], p[2])
+                slopes = [image(p[1], p[2])] + [
+                    p[0] * (image(p[1] + h, p[2] + g) - image(p[1] - h, p[2] - g)) / 2e-3
+                    for h, g in ((1e-3, 0), (0, 1e-3))]
+                p = p + np.linalg.lstsq(np.array(slopes).T * weight[:, None], rest * weight, rcond=None)[0]
+            found.append(1 - NORMAL.cdf(2.3263479 - np.linalg.norm(rest * weight)))
+        return np.mean(found)
+
+    def test_points_are_near_the_bound(self):
+        point = self.out["curves"][0]["points"][0]
+        # Pd rises by 0.02 for 1 % of separation; phases and directions differ
+        self.assertAlmostEqual(self.pd_of_known_pair(point["bound_known_px"]), 0.9, delta=0.01)
+        # six standard deviations below the bound would be an error of the bound
+        sigma = point["separation_pd90_sigma_px"]
+        self.assertTrue(0 < sigma < 0.15)
+        self.assertGreater(point["separation_pd90_px"], point["bound_known_px"] - 6 * sigma)
+        self.assertLess(point["separation_pd90_px"], 1.3 * point["bound_known_px"])
+
+    def test_plot(self):
+        if os.path.exists(self.plot):  # gnuplot may be missing: a warning then
+            with open(self.plot, "rb") as file:
+                self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
+        else:
+            self.assertIn("gnuplot", self.result.stderr)
+
+    def test_threads_and_module_do_not_matter(self):
+        short = ["--pair", "--snr", "60", "--ratio", "1", "--trials", "30", "--separation", "0.8,1.1,1.5",
+                 *self.SMALL]
+        outs = []
+        for extra in (["--false-splits", "0.02"],
+                      ["--module", "--set", runs.SENSOR + "/modules/imgproc/false_splits=0.02"]):
+            path = os.path.join(self.folder, "same.json")
+            result = pd(*short, "--json", path, *extra)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(path) as file:
+                outs.append(json.load(file)["curves"][0]["points"][0])
+        self.assertEqual(outs[0]["separations"], outs[1]["separations"])
+        self.assertEqual(outs[0]["singles_split"], outs[1]["singles_split"])
+
+    def test_without_pair_test(self):
+        path = os.path.join(self.folder, "without.json")
+        result = pd("--pair", "--snr", "50", "--ratio", "1", "--trials", "30", "--separation", "1.3,6",
+                    "--json", path, *self.SMALL)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("no test for pairs", result.stdout)
+        with open(path) as file:
+            point = json.load(file)["curves"][0]["points"][0]
+        self.assertEqual([s["found"] for s in point["separations"]], [0, 30])
+        self.assertIsNone(point["separation_pd90_px"])  # not enclosed by two separations
+        self.assertLess(point["singles_split"], 3)
+
+
 class WrongCalls(unittest.TestCase):
     def test_messages(self):
         for words, code, hint in ((["--snr", "2:12"], 2, "FIRST:LAST:STEP"),
@@ -180,7 +285,20 @@ class WrongCalls(unittest.TestCase):
                                    "leave out --star-streak"),
                                   (["--module", "--false-alarms", "2"], 1, "--set"),
                                   (["--cell", "10"], 1, "--cell"),
-                                  (["--streak", "990"], 1, "no room")):
+                                  (["--streak", "990"], 1, "no room"),
+                                  (["--ratio", "1"], 2, "--ratio has no effect without --pair"),
+                                  (["--pair", "--ratio", "0.5"], 2, "numbers from 1 to 1000"),
+                                  (["--pair", "--ratio", "1,2,3,4,5"], 2, "more than 4"),
+                                  (["--pair", "--separation", "2,1"], 2, "above the one before"),
+                                  (["--pair", "--separation", "1,,2"], 2, "not a list"),
+                                  (["--pair", "--separation", "1000"], 1, "no room"),
+                                  (["--pair", "--snr", "20;50"], 2, "not a list"),
+                                  (["--pair", "--snr", "10:100:1"], 2, "at most 24"),
+                                  (["--pair", "--magnitude", "9:12:1"], 2, "leave out --magnitude"),
+                                  (["--pair", "--stars"], 2, "leave out --stars"),
+                                  (["--pair", "--stack", "8"], 2, "leave out --stack"),
+                                  (["--pair", "--false-splits", "0.5"], 2, "0 to 0.1"),
+                                  (["--pair", "--module", "--false-splits", "0.01"], 1, "--set")):
             result = pd(*words)
             self.assertEqual(result.returncode, code, (words, result.stderr))
             self.assertIn(hint, result.stderr)

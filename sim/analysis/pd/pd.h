@@ -12,6 +12,8 @@
 #include "sim/eval/target_match.h"
 
 enum { BST_PD_POINTS = 200, BST_PD_PHASES = 10 };
+/* Largest separation of pairs that are chosen by the bound, FWHM. */
+#define BST_PD_WIDEST_PAIR_FWHM 4.0
 
 /* Options of a measurement. */
 typedef struct bst_pd_options {
@@ -26,6 +28,9 @@ typedef struct bst_pd_options {
     double jitter_px;     /* blur per axis; < 0: as configured for image processing */
     double min_separation_px; /* minimum distance between targets, beyond their length */
     double cell_px;           /* cell size of the target grid; 0: min_separation_px + length + 40 */
+    bool pairs;               /* targets are pairs of sources: pd_pair.h */
+    double widest_pair_px;    /* largest separation; 0: BST_PD_WIDEST_PAIR_FWHM */
+    double false_splits;      /* share of single sources, asked of the detector; < 0: scenario's */
     bool stars;               /* with the stars and sky of the scenario */
     int64_t stack;            /* frames that are searched together; 0: single frames */
     double rates_px;          /* per frame: maximum motion of a stack's targets in x and y */
@@ -102,6 +107,15 @@ int bst_pd_scene_room(const bst_pd_scene *scene);
  * seed and the number. Frames without targets have different noise. */
 bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *scene, int64_t number, bool targets,
                             bst_pd_frame *frame) BST_MUST_CHECK;
+/* One target of a frame of pairs. */
+typedef struct bst_pd_pair_target {
+    double snr, ratio;    /* of both as one source; brightness of the first over the second */
+    double separation_px; /* 0: a single source */
+} bst_pd_pair_target;
+/* Defines frame `number` of pairs, in random directions, one in each cell: targets[i] in cell i.
+ * The centroid of the light becomes places[i]. For a scene opened with options.pairs. */
+void bst_pd_scene_set_pairs(bst_pd_scene *scene, int64_t number, const bst_pd_pair_target *targets,
+                            bst_pd_frame *frame);
 /* Sum of squared pixel fractions of a target of unit flux. */
 double bst_pd_sharpness(const bst_pd_scene *scene, const bst_eval_match_target *place);
 

@@ -178,6 +178,11 @@ static bst_status open_function(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *
         d->config.false_alarms_per_frame = s->options.false_alarms;
     }
     s->options.false_alarms = d->config.false_alarms_per_frame;
+    if (s->options.pairs) {
+        d->config.false_splits =
+            s->options.false_splits < 0.0 ? d->config.false_splits : s->options.false_splits;
+        s->options.false_splits = d->config.false_splits;
+    }
     double room = ROOM_PER_TARGET * (double)bst_pd_scene_room(s) +
                   20.0 * d->config.false_alarms_per_frame + 1000.0;
     room = s->options.stars ? MOST_DETECTIONS : fmin(room, MOST_DETECTIONS);
@@ -203,6 +208,12 @@ bst_status bst_pd_detector_open(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *
     if (!by_function && s->options.false_alarms > 0.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--false-alarms sets the detector that comes with Boresight, driven by its "
+                        "function; set those of %s/%s by --set",
+                        s->name, s->imgproc->name);
+    }
+    if (!by_function && s->options.pairs && s->options.false_splits >= 0.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--false-splits sets the detector that comes with Boresight, driven by its "
                         "function; set those of %s/%s by --set",
                         s->name, s->imgproc->name);
     }

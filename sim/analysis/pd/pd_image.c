@@ -11,6 +11,7 @@ enum {
     REACH_PX = 12,
     POWER_REACH_PX = 7, /* light beyond this contributes less than 2e-4 to the sum of squares */
     PATH_PER_PX = 2,
+    EXACT_PATH_PER_PX = 4,                  /* of shares at exact places */
     SIDE = 2 * PER_PX * (REACH_PX + 1) + 1, /* one more pixel for differences */
 };
 
@@ -142,4 +143,54 @@ bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *m, const bst_eval_matc
     int count = draw(m, place, true);
     const bst_location_image image = {m->share, m->by_x, m->by_y, count};
     return bst_location_bound_of(ctx, &image, flux_e, noise, out);
+}
+
+/* Weights of cubic Lagrange interpolation at t, 0 <= t < 1, from the samples -1, 0, 1 and 2. */
+static void cubic_weights(double t, double out[4]) {
+    out[0] = -t * (t - 1.0) * (t - 2.0) / 6.0;
+    out[1] = 0.5 * (t + 1.0) * (t - 1.0) * (t - 2.0);
+    out[2] = -0.5 * (t + 1.0) * t * (t - 2.0);
+    out[3] = (t + 1.0) * t * (t - 1.0) / 6.0;
+}
+
+/* Adds a part of the light at (x, y) relative to the region's first pixel, from one table. */
+static void add_exactly(const double *table, int width, int height, double x, double y,
+                        double weight, double *share) {
+    int cell_x = (int)floor(-x * PER_PX), cell_y = (int)floor(-y * PER_PX);
+    int middle = (SIDE - 1) / 2, reach = REACH_PX - 1;
+    double by_x[4], by_y[4];
+    cubic_weights(-x * PER_PX - cell_x, by_x);
+    cubic_weights(-y * PER_PX - cell_y, by_y);
+    int first_x = (int)fmax(ceil(x - reach), 0.0), end_x = (int)fmin(x + reach + 1.0, width);
+    int first_y = (int)fmax(ceil(y - reach), 0.0), end_y = (int)fmin(y + reach + 1.0, height);
+    for (int j = first_y; j < end_y; j++) {
+        for (int i = first_x; i < end_x; i++) {
+            const double *at = table + (size_t)(middle + j * PER_PX + cell_y - 1) * SIDE +
+                               (size_t)(middle + i * PER_PX + cell_x - 1);
+            double sum = 0.0;
+            for (int v = 0; v < 4; v++) {
+                const double *row = at + (size_t)v * SIDE;
+                sum += by_y[v] *
+                       (by_x[0] * row[0] + by_x[1] * row[1] + by_x[2] * row[2] + by_x[3] * row[3]);
+            }
+            share[j * width + i] += weight * sum;
+        }
+    }
+}
+
+void bst_pd_image_shares(const bst_pd_image *m, const bst_eval_match_target *place, int x0, int y0,
+                         int width, int height, double *share) {
+    memset(share, 0, (size_t)width * (size_t)height * sizeof *share);
+    mix nodes;
+    nodes.count = bst_psf_weights(m->psf, place->x_px, place->y_px, nodes.node, nodes.weight);
+    double length = hypot(place->dx_px, place->dy_px);
+    int parts = length > 0.0 ? (int)ceil(length * EXACT_PATH_PER_PX) : 1;
+    for (int k = 0; k < parts; k++) {
+        double u = (k + 0.5) / parts - 0.5;
+        for (int n = 0; n < nodes.count; n++) {
+            add_exactly(m->table + (size_t)nodes.node[n] * SIDE * SIDE, width, height,
+                        place->x_px + u * place->dx_px - x0, place->y_px + u * place->dy_px - y0,
+                        nodes.weight[n] / parts, share);
+        }
+    }
 }

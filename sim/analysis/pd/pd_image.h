@@ -24,4 +24,11 @@ bst_status bst_pd_image_bound(bst_ctx *ctx, bst_pd_image *image, const bst_eval_
                               double flux_e, const bst_eval_bound_noise *noise,
                               bst_location_bound *out) BST_MUST_CHECK;
 
+/* Fractions of a target's light in the pixels x0 .. x0 + width - 1 and y0 .. y0 + height - 1, for
+ * its exact position in the pixel: cubic interpolation of the tables.
+ *
+ * Returned:  share  [height][width] */
+void bst_pd_image_shares(const bst_pd_image *image, const bst_eval_match_target *place, int x0,
+                         int y0, int width, int height, double *share);
+
 #endif

@@ -38,6 +38,16 @@ static bst_status measure_single(bst_ctx *ctx, const bst_pd_request *r,
     return status;
 }
 
+/* Writes the results and frees them. */
+static bst_status write_json(bst_ctx *ctx, const char *path, cJSON *root) {
+    char *text = cJSON_Print(root);
+    bst_status status = text ? bst_io_write_file_atomic(ctx, path, text, strlen(text))
+                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the results");
+    free(text);
+    cJSON_Delete(root);
+    return status;
+}
+
 static bst_status write_results(bst_ctx *ctx, const bst_pd_request *r, const bst_scenario *scenario,
                                 const bst_pd_scene *scene, const bst_pd_result *result) {
     bst_pd_figures figures, single;
@@ -48,18 +58,33 @@ static bst_status write_results(bst_ctx *ctx, const bst_pd_request *r, const bst
     }
     bst_pd_print(scene, result, &figures);
     if (r->json) {
-        cJSON *root = bst_pd_json(scene, result, &figures);
-        char *text = cJSON_Print(root);
-        bst_status status = text ? bst_io_write_file_atomic(ctx, r->json, text, strlen(text))
-                                 : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the results");
-        free(text);
-        cJSON_Delete(root);
-        BST_TRY(status);
+        BST_TRY(write_json(ctx, r->json, bst_pd_json(scene, result, &figures)));
     }
     return r->plot ? bst_pd_plot(ctx, r->plot, scene, result, &figures) : BST_OK;
 }
 
+static bst_status measure_pairs(bst_ctx *ctx, const bst_pd_request *r,
+                                const bst_scenario *scenario) {
+    bst_pd_pair_result *result = malloc(sizeof *result);
+    if (!result) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the measurement");
+    }
+    bst_status status = bst_pd_pair_run(ctx, scenario, &r->options, &r->pairs, result);
+    if (status == BST_OK) {
+        bst_pd_pair_print(result);
+        status = r->json ? write_json(ctx, r->json, bst_pd_pair_json(result)) : BST_OK;
+    }
+    if (status == BST_OK && r->plot) {
+        status = bst_pd_pair_plot(ctx, r->plot, result);
+    }
+    free(result);
+    return status;
+}
+
 bst_status bst_pd_measure(bst_ctx *ctx, const bst_pd_request *r, const bst_scenario *scenario) {
+    if (r->pair) {
+        return measure_pairs(ctx, r, scenario);
+    }
     bst_pd_scene *scene = calloc(1, sizeof *scene);
     bst_pd_result *result = calloc(1, sizeof *result);
     bst_pd_detector *detector = NULL;

@@ -5,7 +5,8 @@
 #include "sim/analysis/pd/pd_request.h"
 
 /* Measures the detector of a scenario, prints the table to stdout, and writes the JSON file and the
- * plot if asked for. For a stack, the detector is measured on single frames, too.
+ * plot if asked for. For a stack, the detector is measured on single frames, too. With
+ * request->pair, pairs are measured: pd_pair.h.
  *
  * Given:     request  after bst_pd_request_settle
  * Errors:    BST_ERR_INTERRUPTED; BST_ERR_MEMORY; those of opening the scene and the detector, of

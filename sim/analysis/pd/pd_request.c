@@ -1,8 +1,12 @@
 #include "sim/analysis/pd/pd_request.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Fainter pairs are not detected at all. */
+static const double LEAST_PAIR_SNR = 3.0;
 
 #define FIELD(member) .offset = offsetof(bst_pd_request, member)
 
@@ -11,7 +15,7 @@ const bst_option bst_pd_option_table[] = {
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(bst_pd_request, range),
      .argument = "FIRST:LAST:STEP",
-     .doc = "SNRs of the targets (default 2:12:0.5)"},
+     .doc = "SNRs of the targets (default 2:12:0.5); with --pair also a list, such as 20,50,100"},
     {.name = "magnitude",
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(bst_pd_request, magnitudes),
@@ -21,7 +25,8 @@ const bst_option bst_pd_option_table[] = {
      .kind = BST_OPTION_INT,
      .offset = offsetof(bst_pd_request, options.trials),
      .argument = "N",
-     .doc = "targets of each SNR (default 1000)",
+     .doc = "targets of each SNR (default 1000); with --pair pairs of each separation (default "
+            "300)",
      .minimum = 1,
      .maximum = 1e9},
     {.name = "json",
@@ -65,6 +70,33 @@ const bst_option bst_pd_option_table[] = {
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(bst_pd_request, options.known_rate),
      .doc = "the camera turns, each frame in its own direction, and image processing knows it"},
+    {.name = "pair",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_pd_request, pair),
+     .doc = "measure at which separation two sources are found as two, over the SNR of both "
+            "(default 20,50,100,200), beside the bound; with --streak of points and of streaks of "
+            "known motion"},
+    {.name = "separation",
+     .needs = "pair",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_pd_request, separations),
+     .argument = "PX,...",
+     .doc = "separations of the pairs (default: about the bound of each SNR)"},
+    {.name = "ratio",
+     .needs = "pair",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_pd_request, ratios),
+     .argument = "R,...",
+     .doc = "brightness of one source over that of the other (default 1,4)"},
+    {.name = "false-splits",
+     .needs = "pair",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_pd_request, options.false_splits),
+     .argument = "SHARE",
+     .doc = "share of single sources found as two, asked of the detector; 0: no pair test "
+            "(default: the scenario's false_splits)",
+     .minimum = 0,
+     .maximum = 0.1},
     {.name = "false-alarms",
      .kind = BST_OPTION_REAL,
      .offset = offsetof(bst_pd_request, options.false_alarms),
@@ -168,11 +200,100 @@ bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *text, d
     return BST_OK;
 }
 
-bst_status bst_pd_request_settle(bst_ctx *ctx, bst_pd_request *r, const bst_option *table) {
+bst_status bst_pd_list_read(bst_ctx *ctx, const char *text, bst_pd_list *list) {
+    double v[BST_PD_POINTS];
+    const char *at = text;
+    int n = 0;
+    assert(list->most <= BST_PD_POINTS);
+    for (bool more = true; more; at += more) {
+        char *end;
+        double value = strtod(at, &end);
+        more = *end == ',';
+        if (end == at || !isfinite(value) || (!more && *end != '\0')) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s \"%s\" is not a list of numbers, for example 1,4", list->name,
+                            text);
+        }
+        if (!(value >= list->low && value <= list->high) || (n > 0 && value <= v[n - 1])) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s \"%s\": numbers from %g to %g, each above the one before",
+                            list->name, text, list->low, list->high);
+        }
+        if (n == list->most) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s \"%s\" has more than %d numbers",
+                            list->name, text, list->most);
+        }
+        v[n++] = value;
+        at = end;
+    }
+    memcpy(list->values, v, (size_t)n * sizeof *v);
+    list->count = n;
+    return BST_OK;
+}
+
+/* Reads the SNRs of pairs: a list, or FIRST:LAST:STEP. */
+static bst_status read_pair_snrs(bst_ctx *ctx, const char *text, bst_pd_request *r) {
+    bst_pd_pair_options *p = &r->pairs;
+    if (!strchr(text, ':')) {
+        bst_pd_list list = {"snr", LEAST_PAIR_SNR, 1e4, p->snr, BST_PD_PAIR_SNRS, 0};
+        BST_TRY(bst_pd_list_read(ctx, text, &list));
+        p->snrs = list.count;
+        return BST_OK;
+    }
+    bst_pd_options range;
+    BST_TRY(bst_pd_range_read(ctx, "snr", text, LEAST_PAIR_SNR, 1e4, &range));
+    p->snrs = (int)floor((range.high - range.low) / range.step + 1e-9) + 1;
+    if (p->snrs > BST_PD_PAIR_SNRS) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "--snr \"%s\": with --pair at most %d SNRs", text,
+                        BST_PD_PAIR_SNRS);
+    }
+    for (int i = 0; i < p->snrs; i++) {
+        p->snr[i] = range.low + i * range.step;
+    }
+    return BST_OK;
+}
+
+/* Reads what --pair measures, and refuses options of other measurements. */
+static bst_status settle_pairs(bst_ctx *ctx, bst_pd_request *r) {
+    bst_pd_options *o = &r->options;
+    bst_pd_pair_options *p = &r->pairs;
+    const struct {
+        const char *name;
+        bool given;
+    } other[] = {{"magnitude", r->magnitudes},
+                 {"stack", o->stack > 0},
+                 {"stars", o->stars},
+                 {"star-streak", o->star_streak_px > 0.0},
+                 {"empty-frames", o->empty_frames > 0}};
+    for (size_t i = 0; i < sizeof other / sizeof *other; i++) {
+        if (other[i].given) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--pair measures pairs over SNR in single frames without stars: leave "
+                            "out --%s",
+                            other[i].name);
+        }
+    }
+    o->trials = o->trials > 0 ? o->trials : 300;
+    BST_TRY(read_pair_snrs(ctx, r->range ? r->range : "20,50,100,200", r));
+    if (r->separations) {
+        bst_pd_list list = {
+            "separation", 0.01, 1000.0, p->separation_px, BST_PD_PAIR_SEPARATIONS, 0};
+        BST_TRY(bst_pd_list_read(ctx, r->separations, &list));
+        p->separations = list.count;
+    }
+    bst_pd_list list = {"ratio", 1.0, 1000.0, p->ratio, BST_PD_PAIR_RATIOS, 0};
+    BST_TRY(bst_pd_list_read(ctx, r->ratios ? r->ratios : "1,4", &list));
+    p->ratios = list.count;
+    return BST_OK;
+}
+
+/* Reads what a measurement over SNR or magnitude takes. */
+static bst_status settle_curve(bst_ctx *ctx, bst_pd_request *r) {
     bst_pd_options *o = &r->options;
     if (r->range && r->magnitudes) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "give --snr or --magnitude, not both");
     }
+    o->trials = o->trials > 0 ? o->trials : 1000;
     o->by_magnitude = r->magnitudes;
     BST_TRY(r->magnitudes ? bst_pd_range_read(ctx, "magnitude", r->magnitudes, -30.0, 40.0, o)
                           : bst_pd_range_read(ctx, "snr",
@@ -180,10 +301,6 @@ bst_status bst_pd_request_settle(bst_ctx *ctx, bst_pd_request *r, const bst_opti
                                               : o->stack > 0 ? "0.8:2.4:0.1"
                                                              : "2:12:0.5",
                                               0.1, 1e4, o));
-    if (o->known_rate && !(o->streak_px > 0.0)) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "--known-rate is of streaks: give their length with --streak PX");
-    }
     if (o->known_rate && o->star_streak_px > 0.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "with --known-rate stars streak as targets do: leave out --star-streak");
@@ -200,6 +317,15 @@ bst_status bst_pd_request_settle(bst_ctx *ctx, bst_pd_request *r, const bst_opti
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--stars keeps the scenario's sky, --background sets another: give one");
     }
-    o->threads = (int)r->threads;
+    return BST_OK;
+}
+
+bst_status bst_pd_request_settle(bst_ctx *ctx, bst_pd_request *r, const bst_option *table) {
+    if (r->options.known_rate && !(r->options.streak_px > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--known-rate is of streaks: give their length with --streak PX");
+    }
+    r->options.threads = (int)r->threads;
+    BST_TRY(r->pair ? settle_pairs(ctx, r) : settle_curve(ctx, r));
     return bst_load_check(ctx, &r->load, table);
 }

@@ -2,7 +2,7 @@
 #ifndef BST_ANALYSIS_PD_PD_REQUEST_H
 #define BST_ANALYSIS_PD_PD_REQUEST_H
 
-#include "sim/analysis/pd/pd.h"
+#include "sim/analysis/pd/pd_pair.h"
 #include "sim/cli/load.h"
 
 /* What the command line asks for. */
@@ -10,7 +10,10 @@ typedef struct bst_pd_request {
     bst_load_options load;
     bst_pd_options options;
     const char *range, *magnitudes; /* texts of --snr and --magnitude; NULL: not given */
-    const char *json, *plot;        /* files to write; NULL: none */
+    bool pair;
+    bst_pd_pair_options pairs;
+    const char *ratios, *separations; /* texts of --ratio and --separation; NULL: not given */
+    const char *json, *plot;          /* files to write; NULL: none */
     int64_t threads;
     bool help;
 } bst_pd_request;
@@ -19,7 +22,7 @@ typedef struct bst_pd_request {
 #define BST_PD_REQUEST_DEFAULTS                 \
     {                                           \
         .load = BST_LOAD_DEFAULTS, .options = { \
-            .trials = 1000,                     \
+            .false_splits = -1.0,               \
             .background_e = -1.0,               \
             .jitter_px = -1.0,                  \
             .min_separation_px = 24.0,          \
@@ -38,6 +41,20 @@ extern const bst_option bst_pd_option_table[];
  *            of 0 or less, or BST_PD_POINTS steps or more */
 bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *text, double low,
                              double high, bst_pd_options *out) BST_MUST_CHECK;
+
+/* A list of an option. */
+typedef struct bst_pd_list {
+    const char *name; /* of the option, for messages */
+    double low, high; /* least and greatest value allowed */
+    double *values;   /* [most], lent */
+    int most, count;
+} bst_pd_list;
+
+/* Reads ascending numbers such as "20,50,100" into list->values and list->count.
+ *
+ * Errors:    BST_ERR_ARGUMENT: not such a list, out of range, not ascending, or too long; the
+ *            values stay as they are */
+bst_status bst_pd_list_read(bst_ctx *ctx, const char *text, bst_pd_list *list) BST_MUST_CHECK;
 
 /* Reads the texts of the request into request->options and checks that its options fit together.
  *

@@ -216,7 +216,10 @@ static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
     const bst_pd_options *o = &s->options;
     s->min_separation_px = o->min_separation_px + o->streak_px;
     s->min_separation_px += o->stack > 0 ? o->rates_px * (double)(o->stack - 1) : 0.0;
-    s->cell_px = o->cell_px > 0.0 ? o->cell_px : s->min_separation_px + 40.0;
+    s->min_separation_px += !o->pairs                 ? 0.0
+                            : o->widest_pair_px > 0.0 ? o->widest_pair_px
+                                                      : BST_PD_WIDEST_PAIR_FWHM * s->fwhm_px;
+    s->cell_px = o->cell_px > 0.0 ? o->cell_px : s->min_separation_px + (o->pairs ? 4.0 : 40.0);
     if (s->cell_px < s->min_separation_px + 2.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--cell %g: at least %g px, the distance that is kept between targets and "
@@ -231,14 +234,14 @@ static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
                         s->name, (long long)s->camera.width_px, (long long)s->camera.height_px,
                         s->cell_px);
     }
-    size_t room = (size_t)bst_pd_scene_room(s);
+    size_t room = (size_t)bst_pd_scene_room(s), sources = o->pairs ? 2 * room : room;
     for (int i = 0; i < 2; i++) {
         bst_pd_frame *f = &s->frames[i];
         f->places = calloc(room, sizeof *f->places);
         f->targets = calloc(room, sizeof *f->targets);
-        f->sources = calloc(room, sizeof *f->sources);
-        f->source_room = (int)room;
-        f->paths = calloc(room, sizeof *f->paths);
+        f->sources = calloc(sources, sizeof *f->sources);
+        f->source_room = (int)sources;
+        f->paths = calloc(sources, sizeof *f->paths);
         if (!f->places || !f->targets || !f->sources || !f->paths) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu targets a frame", room);
         }
@@ -348,9 +351,9 @@ static bool seen(const bst_camera *c, const bst_pd_frame *f, int end, bst_vec3 v
     return bst_camera_project(c, bst_quat_rotate(f->q[end], v), x, y);
 }
 
-static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int point,
-                       double angle) {
-    int i = f->count++;
+/* Sets source i of the frame without its light. Returns its place and path. */
+static bst_eval_match_target set_source(bst_pd_scene *s, bst_pd_frame *f, int i, double x, double y,
+                                        double angle) {
     const bst_camera *c = &s->camera;
     double length = s->options.streak_px, dx = length * cos(angle), dy = length * sin(angle);
     bst_scene_source *source = &f->sources[i];
@@ -371,13 +374,19 @@ static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int
             direction(c, f->q[1], x + 0.5 * dx, y + 0.5 * dy));
         source->path = &f->paths[i];
     }
-    f->places[i] = (bst_eval_match_target){x, y, dx, dy};
+    return (bst_eval_match_target){x, y, dx, dy};
+}
+
+static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int point,
+                       double angle) {
+    int i = f->count++;
+    f->places[i] = set_source(s, f, i, x, y, angle);
     double flux = s->flux_e[point], noise_e = noise_at(s, x, y);
     if (!s->options.by_magnitude) { /* SNR at its own position */
         flux = s->snr[point] * noise_e / sqrt(bst_pd_sharpness(s, &f->places[i]));
     }
-    double light = bst_camera_illumination(c, x, y);
-    source->electrons_per_s = flux / s->exposure_s / (s->options.by_magnitude ? 1.0 : light);
+    double light = bst_camera_illumination(&s->camera, x, y);
+    f->sources[i].electrons_per_s = flux / s->exposure_s / (s->options.by_magnitude ? 1.0 : light);
     f->targets[i] = (bst_pd_target){point, s->options.by_magnitude ? flux * light : flux, noise_e};
 }
 
@@ -410,6 +419,15 @@ int bst_pd_scene_stacked(const bst_pd_scene *s) {
     return s->options.stack > 0 ? (int)s->options.stack : 1;
 }
 
+/* Place of a target in cell i, by two uniform numbers. */
+static void place_in_cell(const bst_pd_scene *s, int i, const double u[2], double *x, double *y) {
+    double origin_x = 0.5 * ((double)s->camera.width_px - s->columns * s->cell_px) - 0.5;
+    double origin_y = 0.5 * ((double)s->camera.height_px - s->rows * s->cell_px) - 0.5;
+    double span = s->cell_px - s->min_separation_px;
+    *x = origin_x + (i % s->columns) * s->cell_px + 0.5 * s->min_separation_px + u[0] * span;
+    *y = origin_y + (i / s->columns) * s->cell_px + 0.5 * s->min_separation_px + u[1] * span;
+}
+
 /* Places equally many targets of each SNR, alternating over the frame; frames after the last trial
  * serve for chance matches. */
 static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_rng_key key,
@@ -419,9 +437,6 @@ static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_r
     number /= stacked;
     int64_t first = number * room, last = s->points * s->options.trials;
     int64_t shift = room % s->points == 0 ? number : 0;
-    double origin_x = 0.5 * ((double)s->camera.width_px - s->columns * s->cell_px) - 0.5;
-    double origin_y = 0.5 * ((double)s->camera.height_px - s->rows * s->cell_px) - 0.5;
-    double span = s->cell_px - s->min_separation_px;
     f->count = 0;
     for (int i = 0; i < room && (first + i < last || first >= last); i++) {
         uint64_t draw = 3 * (uint64_t)i;
@@ -435,12 +450,9 @@ static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_r
                 bst_rng_uniform(key, (uint64_t)number, 3 * (uint64_t)room + 2 * (uint64_t)i + k);
             moved[k] = s->options.rates_px * (2.0 * rate - 1.0) * from_middle;
         }
-        add_target(s, f,
-                   origin_x + (i % s->columns) * s->cell_px + 0.5 * s->min_separation_px +
-                       u[0] * span + moved[0],
-                   origin_y + (i / s->columns) * s->cell_px + 0.5 * s->min_separation_px +
-                       u[1] * span + moved[1],
-                   (int)((first + i + shift) % s->points),
+        double x, y;
+        place_in_cell(s, i, u, &x, &y);
+        add_target(s, f, x + moved[0], y + moved[1], (int)((first + i + shift) % s->points),
                    s->options.known_rate ? heading : 2.0 * BST_PI * u[2]);
     }
 }
@@ -495,4 +507,51 @@ bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *s, int64_t number, bool 
             bst_rng_make_key(seed, run, s->name, targets ? "pd noise" : "pd noise without targets"),
         .exposure_id = number};
     return BST_OK;
+}
+
+/* Sets the sources of one pair, or one source. Returns their number. */
+static int set_pair(bst_pd_scene *s, bst_pd_frame *f, int i, int first,
+                    const bst_pd_pair_target *pair, double heading, double direction_rad) {
+    double x = f->places[i].x_px, y = f->places[i].y_px, faint = 1.0 / (1.0 + pair->ratio);
+    double noise_e = noise_at(s, x, y);
+    f->places[i] = set_source(s, f, first, x, y, heading);
+    double flux = pair->snr * noise_e / sqrt(bst_pd_sharpness(s, &f->places[i]));
+    f->targets[i] = (bst_pd_target){0, flux, noise_e};
+    int count = pair->separation_px > 0.0 ? 2 : 1;
+    for (int k = 0; k < count; k++) {
+        double share = count == 1 ? 1.0 : k == 0 ? 1.0 - faint : faint;
+        double apart = pair->separation_px * (count == 1 ? 0.0 : k == 0 ? -faint : 1.0 - faint);
+        double at_x = x + apart * cos(direction_rad), at_y = y + apart * sin(direction_rad);
+        set_source(s, f, first + k, at_x, at_y, heading);
+        f->sources[first + k].electrons_per_s =
+            share * flux / s->exposure_s / bst_camera_illumination(&s->camera, at_x, at_y);
+    }
+    return count;
+}
+
+void bst_pd_scene_set_pairs(bst_pd_scene *s, int64_t number, const bst_pd_pair_target *targets,
+                            bst_pd_frame *f) {
+    uint64_t seed = s->scenario->seed, run = (uint64_t)s->scenario->run, n = (uint64_t)number;
+    bst_rng_key key = bst_rng_make_key(seed, run, s->name, "pd pairs");
+    double heading = 2.0 * BST_PI * bst_rng_uniform(key, n, 0);
+    set_motion(s, f, heading, 0.0);
+    f->count = bst_pd_scene_room(s);
+    int sources = 0;
+    for (int i = 0; i < f->count; i++) {
+        uint64_t draw = 1 + 3 * (uint64_t)i;
+        const double u[2] = {bst_rng_uniform(key, n, draw), bst_rng_uniform(key, n, draw + 1)};
+        place_in_cell(s, i, u, &f->places[i].x_px, &f->places[i].y_px);
+        sources += set_pair(s, f, i, sources, &targets[i], heading,
+                            2.0 * BST_PI * bst_rng_uniform(key, n, draw + 2));
+    }
+    double dark_e = s->dark_e - bst_camera_readout_e(&s->camera);
+    f->request =
+        (bst_render_request){.window = {0, 0, (int)s->camera.width_px, (int)s->camera.height_px},
+                             .track = &f->track,
+                             .sources = f->sources,
+                             .count = sources,
+                             .background_e = s->sky_e + dark_e,
+                             .dark_e = dark_e,
+                             .key = bst_rng_make_key(seed, run, s->name, "pd noise of pairs"),
+                             .exposure_id = number};
 }
