@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/satellite/part_shadow.h"
+
 bst_point2 bst_resolved_project(const bst_resolved_adding *a, bst_vec3 p, double *depth_m) {
     bst_vec3 q = bst_vec3_add(a->view->origin_m, bst_mat3_mul_vec(&a->image_from_body, p));
     double f = a->per_m / q.z;
@@ -245,6 +247,46 @@ static bst_status add_pieces(bst_ctx *ctx, const bst_resolved_adding *a, int fac
     return BST_OK;
 }
 
+/* Adds what a light reaches of a facet with a round border of `around` parts a side. Its own
+ * corners are those of the model's polygon, which has another border.
+ *
+ * Returned:  *done  false: too many bodies */
+static bst_status add_round_pieces(bst_ctx *ctx, const bst_resolved_adding *a, int facet,
+                                   int around, int view, const bst_resolved_face *f, double light,
+                                   bool *done) {
+    uint64_t hiders;
+    bst_vec3 corner[BST_POLYGON_CORNERS_MAX], normal = a->pose->normals[facet];
+    bst_point2 flat[BST_POLYGON_CORNERS_MAX];
+    /* with room for the corners that cuts add */
+    int most = BST_POLYGON_CORNERS_MAX / 2 / a->r->satellite->facets[facet].count;
+    *done = around > 1 && most > 1 && bst_part_shadow_hiders(a->pose, view, facet, &hiders);
+    if (!*done) {
+        return BST_OK;
+    }
+    int count = bst_plane_facet_corners(a->pose, &a->r->places, facet,
+                                        around < most ? around : most, corner);
+    double lit = bst_part_shadow_lit(a->pose, view, facet, hiders, corner, count, flat);
+    if (!(lit > 0.0)) {
+        return BST_OK;
+    }
+    const bst_polygon_clip *clip = &a->pose->clip;
+    const bst_pose_view *v = &a->pose->views[view];
+    double in = bst_vec3_dot(normal, v->z);
+    for (int n = 0; n < clip->piece_count; n++) {
+        const bst_polygon_piece *piece = &clip->pieces[n];
+        bst_point2 at[BST_COVERAGE_CORNERS_MAX];
+        int corners = piece->count < BST_COVERAGE_CORNERS_MAX ? piece->count : 0;
+        for (int i = 0; i < corners; i++) {
+            bst_point2 p = clip->points[piece->first + i];
+            bst_vec3 q = bst_vec3_axpy(bst_vec3_scale(v->x, p.x), p.y, v->y);
+            double way = bst_vec3_dot(normal, bst_vec3_sub(corner[0], q)) / in, depth_m;
+            at[i] = bst_resolved_project(a, bst_vec3_axpy(q, way, v->z), &depth_m);
+        }
+        BST_TRY(bst_resolved_add_lit(ctx, a->r, f, at, corners, light));
+    }
+    return BST_OK;
+}
+
 bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a,
                                       const bst_resolved_face *f, double uniform, bool pieces) {
     bst_resolved *r = a->r;
@@ -335,7 +377,11 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
                 BST_TRY(bst_resolved_clear_lit(ctx, r, f));
                 pieces = true;
             }
-            BST_TRY(add_pieces(ctx, a, facet, f, light[view]));
+            bool done;
+            BST_TRY(add_round_pieces(ctx, a, facet, around, view, f, light[view], &done));
+            if (!done) {
+                BST_TRY(add_pieces(ctx, a, facet, f, light[view]));
+            }
         }
     }
     return bst_resolved_add_fragments(ctx, a, f, s.uniform, pieces);
