@@ -1,5 +1,5 @@
-/* Shadows on parts of curved surfaces, and on plane facets with a round border, which are finer than
- * the model's facets. Internal to sim/satellite. */
+/* Shadows on parts of curved surfaces, and on plane facets with a round border, which are finer
+ * than the model's facets. Internal to sim/satellite. */
 #ifndef BST_SATELLITE_PART_SHADOW_H
 #define BST_SATELLITE_PART_SHADOW_H
 

@@ -172,8 +172,7 @@ static void test_library(void **state) {
         bst_assert_ok(&f->ctx, bst_satellite_load(&f->ctx, path, &satellite));
         satellites++;
         for (int n = slow ? first_view : (entry->d_name[0] + direction_set) % SHARE;
-             n <= (slow ? last_view : QUICK - 1);
-             n += slow ? 1 : SHARE + 4) {
+             n <= (slow ? last_view : QUICK - 1); n += slow ? 1 : SHARE + 4) {
             double ratio;
             broken += !judge(f, satellite, entry->d_name, n, &ratio);
             if (ratio > 0.0 && count < MOST) {
