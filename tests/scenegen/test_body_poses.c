@@ -106,10 +106,11 @@ static void test_cut_glints(void **state) {
     for (int n = 0; n < 2 * 9 * 33; n++) {
         const double per = widths[n % 3], k = -4.0 + 0.25 * (n / 18), end = n / 9 % 2;
         const double at = end > 0.0 ? 1.0 - k * per : k * per;
-        bst_glint glints[3] = {{k < 0.0 ? end : at, per}};
-        int count = bst_body_glints_cut(glints, 1, 3);
-        assert_true(count >= 2);
-        const bst_body_times_aim aim = {lengths[n / 3 % 3], 1e4, 1e4, DARK_E2, 0.05, glints, count};
+        bst_body_glints glints = {.items = {{k < 0.0 ? end : at, per}}, .count = 1};
+        bst_body_glints_cut(&glints, 3);
+        assert_true(glints.count >= 2);
+        const bst_body_times_aim aim = {lengths[n / 3 % 3], 1e4,         1e4, DARK_E2, 0.05,
+                                        glints.items,       glints.count};
         bst_body_times_choose(&aim, &t);
         double image = 0.0;
         for (int i = 0; i < t.count; i++) {
@@ -118,8 +119,14 @@ static void test_cut_glints(void **state) {
         double right = per * (lobe_integral((1.0 - at) / per) - lobe_integral(-at / per));
         bst_assert_close(image / right, 1.0, 1e-4); /* GLINT_ERROR of body_precision.c */
     }
-    bst_glint whole[2] = {{0.5, 0.01}};
-    assert_int_equal(bst_body_glints_cut(whole, 1, 2), 1);
+    bst_body_glints whole = {.items = {{0.5, 0.01}}, .count = 1};
+    bst_body_glints_cut(&whole, 2);
+    assert_int_equal(whole.count, 1);
+    bst_assert_close(whole.lost, 0.0, 0.0);
+    whole.items[0].u = 0.99; /* without room it counts in the error */
+    bst_body_glints_cut(&whole, 1);
+    assert_int_equal(whole.count, 1);
+    assert_true(whole.lost > 0.0);
 }
 
 int main(void) {
