@@ -2,10 +2,12 @@
 
 #include <math.h>
 
-/* Shares of the tolerance for cells with a border, for curved surfaces, and for their borders; and
- * for the poses of models with curved surfaces, without, and where many blur the image. Together
- * with that of the nodes they are about the whole: the limits of smear_body.c. */
+/* Shares of the tolerance for cells with a border, in one pose and in some, for curved surfaces,
+ * and for their borders; and for the poses of models with curved surfaces, without, and where many
+ * blur the image. With STAMP_SHARE and that of the nodes (smear_body.c) they are the whole at most.
+ */
 #define CELL_SHARE 0.35
+#define CELL_SHARE_IN_POSES 0.2
 #define CURVED_SHARE 0.12
 #define LIMB_SHARE 0.05
 #define CURVED_POSES_SHARE 0.12
@@ -81,7 +83,8 @@ double bst_body_cell_px(const bst_body_image_plan *p, double area_px2, bool ligh
     double across_px = 2.0 * bst_smear_radius_px(s, p->source);
     bool some = light_only && p->times.count > 1;
     double side = light_only && blurred ? 1.0 : some ? SOME_CELL_PX : 0.5;
-    double allowed_e = CELL_SHARE * s->options.tolerance_sigma * border_noise_e(s, p->light_e);
+    double share = p->times.count > 1 ? CELL_SHARE_IN_POSES : CELL_SHARE;
+    double allowed_e = share * s->options.tolerance_sigma * border_noise_e(s, p->light_e);
     while (!light_only && !blurred && side > 1.0 / FINEST &&
            cell_error(s, p->source, side) * p->light_e > allowed_e &&
            across_px / side <= 0.5 * MOST_ACROSS) {

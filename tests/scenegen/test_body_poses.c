@@ -129,9 +129,54 @@ static void test_cut_glints(void **state) {
     assert_true(whole.lost > 0.0);
 }
 
+/* The times at which facets turn into the light or the view, of a body that turns by 1.9
+ * revolutions. */
+static void test_kinks(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_satellite *satellite;
+    bst_satellite_pose *pose;
+    bst_assert_ok(&ctx,
+                  bst_satellite_load(&ctx, "scenarios/satellites/cubesat_3u.json", &satellite));
+    bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
+    const double turn_rad = 1.9 * 2.0 * BST_PI;
+    bst_scene_source_body body = {.satellite = satellite, .times = 9};
+    body.object_m[0] = body.object_m[1] = (bst_vec3){7e6, 0, 0};
+    body.sun_m =
+        bst_vec3_axpy(body.object_m[0], BST_AU_M, bst_vec3_unit((bst_vec3){0.6, 0.1, -0.5}));
+    for (int k = 0; k < 9; k++) {
+        bst_vec3 turn =
+            bst_vec3_scale(bst_vec3_unit((bst_vec3){0.5, 0.8, 0.3}), turn_rad * k / 8.0);
+        body.q_body_from_gcrf[k] = bst_quat_from_rotvec(turn);
+    }
+    bst_scene_source source = {.kind = BST_SOURCE_OBJECT,
+                               .apparent_mid = {0.0, 0.0, 1.0},
+                               .range_m = 1e5,
+                               .body = &body,
+                               .body_u = {0.0, 1.0}};
+    bst_body_glints kinks = {.count = 0};
+    double lost_rad = bst_body_kinks_find(&source, turn_rad, 0.1, pose, &kinks);
+    assert_int_equal(kinks.count, BST_BODY_KINKS_MAX);
+    assert_true(lost_rad > 0.1); /* there are more than are kept */
+    for (int m = 0; m < kinks.count; m++) {
+        bst_source_body_state at;
+        double least = INFINITY;
+        bst_source_body_at(&source, kinks.items[m].u, &at, NULL);
+        bst_source_body_set_pose(&source, &at, pose);
+        for (int f = 0; f < satellite->facet_count; f++) {
+            least = fmin(least, fabs(bst_vec3_dot(pose->normals[f], at.aim.sun)));
+            least = fmin(least, fabs(bst_vec3_dot(pose->normals[f], at.aim.target)));
+        }
+        /* steps of 0.15 rad; 0.06 in 8 steps of the exposure */
+        bst_assert_close(least, 0.0, 2e-3);
+    }
+    bst_satellite_pose_free(pose);
+    bst_satellite_free(satellite);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_moving_edge),
-                                       cmocka_unit_test(test_glints),
-                                       cmocka_unit_test(test_cut_glints)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_moving_edge), cmocka_unit_test(test_glints),
+        cmocka_unit_test(test_cut_glints), cmocka_unit_test(test_kinks)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
