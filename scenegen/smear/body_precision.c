@@ -2,10 +2,12 @@
 
 #include <math.h>
 
-/* Shares of the tolerance for cells with a border, for curved surfaces, and for their borders; and
- * for the poses of models with curved surfaces, without, and where many blur the image. Together
- * with that of the nodes they are about the whole: the limits of smear_body.c. */
+/* Shares of the tolerance for cells with a border, in one pose and in some, for curved surfaces,
+ * and for their borders; and for the poses of models with curved surfaces, without, and where many
+ * blur the image. With STAMP_SHARE and that of the nodes (smear_body.c) they are the whole at most.
+ */
 #define CELL_SHARE 0.35
+#define CELL_SHARE_IN_POSES 0.2
 #define CURVED_SHARE 0.12
 #define LIMB_SHARE 0.05
 #define CURVED_POSES_SHARE 0.12
@@ -18,15 +20,17 @@
 
 /* Error of the light of a surface that glints: tests/scenegen/test_body_poses.c. */
 #define GLINT_ERROR 1e-4
+/* Light of a glint that no pose meets, over that of its surface in its width. */
+#define LOST_GLINT 2.0
 /* Error of the light of curved surfaces, over that light and the error of their parts in px:
  * measured for satellites of scenarios/satellites, at most 2 where lobes are narrow. */
 #define CURVED_ERROR 1.5
 /* Share of the tolerance by the borders of stamps: of nodes in even light all add up. */
 #define STAMP_SHARE 0.08
 /* Error by cells in which borders of curved surfaces and shadows meet, over the light of a pixel
- * and the side in px: 0.0005 for falcon_9_second_stage, 0.0008 for iss_like, with 10^4 electrons.
+ * and the side in px: 6e-5 for centaur_like of 150 px, by the first moments of the cells.
  */
-#define CURVED_CELL 1e-3
+#define CURVED_CELL 1e-4
 /* Share of the tolerance for a facet that turns into the light: a larger error asks for poses
  * beside it. */
 #define KINK_SHARE 0.03
@@ -79,7 +83,8 @@ double bst_body_cell_px(const bst_body_image_plan *p, double area_px2, bool ligh
     double across_px = 2.0 * bst_smear_radius_px(s, p->source);
     bool some = light_only && p->times.count > 1;
     double side = light_only && blurred ? 1.0 : some ? SOME_CELL_PX : 0.5;
-    double allowed_e = CELL_SHARE * s->options.tolerance_sigma * border_noise_e(s, p->light_e);
+    double share = p->times.count > 1 ? CELL_SHARE_IN_POSES : CELL_SHARE;
+    double allowed_e = share * s->options.tolerance_sigma * border_noise_e(s, p->light_e);
     while (!light_only && !blurred && side > 1.0 / FINEST &&
            cell_error(s, p->source, side) * p->light_e > allowed_e &&
            across_px / side <= 0.5 * MOST_ACROSS) {
@@ -107,9 +112,12 @@ void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, boo
            missed_e = BRIGHTER * p->light_e / (8.0 * poses * poses);
     double allowed_e = KINK_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
     double least_rad = allowed_e / fmax(missed_e, 1e-9);
-    int kinks = least_rad < p->turn_rad
-                    ? bst_body_kinks_find(p->source, least_rad, pose, p->glints + p->glint_count)
-                    : 0;
+    p->glints.count = p->glint_count;
+    p->kinks_e = 0.0;
+    if (least_rad < p->turn_rad) {
+        p->kinks_e =
+            missed_e * bst_body_kinks_find(p->source, p->turn_rad, least_rad, pose, &p->glints);
+    }
     *blurred = sigmas >= BLURRED_SIGMAS;
     double share = *blurred ? BLURRED_POSES_SHARE : POSES_SHARE;
     share = p->source->body->satellite->curved_count > 0 ? CURVED_POSES_SHARE : share;
@@ -118,8 +126,8 @@ void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, boo
                                     .light_e = p->light_e,
                                     .dark_variance_e2 = s->dark_variance_e2,
                                     .allowed_sigma = share * s->options.tolerance_sigma,
-                                    .glints = p->glints,
-                                    .glint_count = p->glint_count + kinks};
+                                    .glints = p->glints.items,
+                                    .glint_count = p->glints.count};
     bst_body_times_choose(&aim, &p->times);
 }
 
@@ -142,12 +150,41 @@ static double peak_e(const bst_resolved_image *m, double electrons) {
     return electrons * most;
 }
 
+/* Error of curved surfaces, sigma. */
+static double curved_sigma(const bst_body_image_plan *d, const bst_resolved_image *m,
+                           double curved_e) {
+    const bst_smear *s = d->s;
+    double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
+    double curved_px = fmax(d->curved_px, m->reached_px[0]);
+    double limb = 0.4 * fmax(fmin(d->limb_px, d->curved_px), m->reached_px[1]) / sigma_px;
+    return (CURVED_ERROR * curved_px + limb) * curved_e / border_noise_e(s, curved_e);
+}
+
+/* Error of one pose that turns, over the light of a pixel. */
+static double turn_error(const bst_body_image_plan *d) {
+    double sigma2 = d->s->sigma_px * d->s->sigma_px + 1.0 / 12.0;
+    return d->turned_px * d->turned_px / 12.0 * 0.12 / sigma2;
+}
+
+double bst_body_least_error(const bst_body_image_plan *next, const bst_smear_body *b,
+                            double curved_e) {
+    const bst_smear *s = next->s;
+    bool light_only = bst_resolved_may_add_light(b->satellite);
+    double error = b->one_pose ? turn_error(next) : 0.0;
+    if (b->one_pose && !light_only) {
+        error += cell_error(s, next->source, bst_body_cell_px(next, 0.0, false, false));
+    }
+    return error * next->light_e / border_noise_e(s, next->light_e) +
+           curved_sigma(next, bst_resolved_image_of(b->image), curved_e) +
+           STAMP_SHARE * s->options.tolerance_sigma;
+}
+
 void bst_body_set_error(bst_body_image_plan *d, bst_smear_body *b, double *light_e,
                         double *curved_e) {
     const bst_smear *s = d->s;
     const bst_resolved_image *m = bst_resolved_image_of(b->image);
     double electrons = d->source->electrons_per_s * s->duration_s, weights = 0.0;
-    double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0), error = 0.0;
+    double error = 0.0;
     *light_e = peak_e(m, electrons);
     for (int k = 0; k < d->times.count; k++) {
         weights += d->times.weight[k];
@@ -158,18 +195,19 @@ void bst_body_set_error(bst_body_image_plan *d, bst_smear_body *b, double *light
     d->pose_e = m->surface_light * weights * electrons;
     d->pose_e = fmax(fmin(d->pose_e, swept_px * *light_e), *light_e);
     if (b->one_pose) {
-        error = d->turned_px * d->turned_px / 12.0 * 0.12 / (sigma_px * sigma_px);
+        error = turn_error(d);
     }
     if (!b->blurred && (!m->second || (d->times.count > 1 && b->cell_px > SOME_CELL_PX))) {
         error += cell_error(s, d->source, b->cell_px);
     }
-    double curved_px = fmax(d->curved_px, m->reached_px[0]);
-    double limb = 0.4 * fmax(fmin(d->limb_px, d->curved_px), m->reached_px[1]) / sigma_px;
-    b->sigma = error * *light_e / border_noise_e(s, *light_e) +
-               (CURVED_ERROR * curved_px + limb) * *curved_e / border_noise_e(s, *curved_e) +
+    b->sigma = error * *light_e / border_noise_e(s, *light_e) + curved_sigma(d, m, *curved_e) +
                bst_body_times_sigma(&d->times, d->pose_e, *light_e, s->dark_variance_e2);
     b->sigma += STAMP_SHARE * s->options.tolerance_sigma;
     if (d->glint_count > 0) {
         b->sigma += GLINT_ERROR * *light_e / sqrt(*light_e + s->dark_variance_e2);
+    }
+    if (!b->one_pose) {
+        double lost_e = LOST_GLINT * fmin(d->glints.lost, 1.0) * d->pose_e + d->kinks_e;
+        b->sigma += lost_e / sqrt(*light_e + s->dark_variance_e2);
     }
 }

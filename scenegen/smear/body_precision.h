@@ -11,8 +11,9 @@ typedef struct bst_body_image_plan {
     const bst_scene_source *source;
     bst_body_times times;                 /* weights with the factors on the light */
     double moved_px, turn_rad, turned_px; /* motion in the exposure */
-    bst_glint glints[BST_BODY_GLINTS_MAX + BST_BODY_KINKS_MAX];
+    bst_body_glints glints;
     int glint_count;           /* without those of kinks, which follow */
+    double kinks_e;            /* error by kinks without room, electrons */
     double light_e;            /* in a pixel, for which the image is drawn */
     double pose_e;             /* the same of a pose without motion; 0: not known yet */
     double curved_px, limb_px; /* see bst_resolved_view */
@@ -47,5 +48,10 @@ bool bst_body_even(const bst_body_image_plan *plan);
  *            *curved_e  the same of surfaces that are curved or have round borders */
 void bst_body_set_error(bst_body_image_plan *plan, bst_smear_body *body, double *light_e,
                         double *curved_e);
+
+/* Error of the next drawing of an image but for its nodes, at least: of the light that it has, with
+ * as many parts of curved surfaces as there may be, and of one pose with its cells. */
+double bst_body_least_error(const bst_body_image_plan *next, const bst_smear_body *body,
+                            double curved_e);
 
 #endif

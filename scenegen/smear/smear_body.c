@@ -20,11 +20,10 @@
 #define POINT_PX 2.0
 #define IMAGE_PX 32.0
 
-/* An image whose predicted error without its nodes is above that share of the tolerance, because it
- * is brighter than expected, is drawn again for the light that it has. */
-#define IMAGE_LIMIT 0.74
-/* The same of flat surfaces with few poses, which take less. */
-#define FLAT_LIMIT 0.55
+/* An image whose predicted error leaves too little of the tolerance for its nodes, because it is
+ * brighter than expected, is drawn again for the light that it has, unless the error stays above
+ * that share of what it is. */
+#define WORTH 0.9
 /* Error of neighbouring nodes together, over the largest of one. */
 #define NEIGHBOURS 1.25
 /* The same where the image is that of some poses, of which the errors have the same signs. */
@@ -376,6 +375,11 @@ static bst_status draw_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_
     return b->empty ? BST_OK : draw_poses(ctx, s, b, d, low, high);
 }
 
+/* Error of all nodes, over their share of the tolerance. */
+static double neighbours_of(const bst_smear_body *b) {
+    return b->one_pose || b->blurred ? NEIGHBOURS : NEIGHBOURS_IN_POSES;
+}
+
 /* Makes the image of a source for the frame: again, finer, if its light turns out to be so bright
  * that the error is too large. *there false: a part of the body is beside the observer. */
 static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
@@ -393,7 +397,8 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
         (void)bst_smear_project(s, source, bst_los_track_attitude(&s->track, 0.5 * s->duration_s),
                                 bst_scene_source_direction(source, 0.5), &b->x0, &b->y0);
     } else {
-        d.glint_count = bst_body_glints_find(source, &b->glints, d.turn_rad, b->pose, d.glints);
+        bst_body_glints_find(source, &b->glints, d.turn_rad, b->pose, &d.glints);
+        d.glint_count = d.glints.count;
     }
     b->sigma = 0.0;
     for (int round = 0; round < ROUNDS; round++) {
@@ -403,13 +408,15 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
             return BST_OK;
         }
         bst_body_set_error(&d, b, &light_e, &curved_e);
-        bool flat = b->satellite->curved_count == 0 && !b->blurred;
-        if (b->sigma <= (flat ? FLAT_LIMIT : IMAGE_LIMIT) * s->options.tolerance_sigma ||
-            (round > 0 && b->sigma > 0.9 * before)) {
-            break;
-        }
+        double limit = 1.0 - IMAGE_SHARE * neighbours_of(b);
         d.light_e = fmax(light_e, 1.1 * d.light_e);
         d.curved_px = bst_body_curved_px(s, curved_e);
+        d.limb_px = bst_body_limb_px(s, d.light_e);
+        if (b->sigma <= limit * s->options.tolerance_sigma ||
+            (round > 0 && b->sigma > WORTH * before) ||
+            bst_body_least_error(&d, b, curved_e) > WORTH * b->sigma) {
+            break;
+        }
     }
     return BST_OK;
 }
@@ -460,7 +467,6 @@ bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_sour
         s->last_read_e = electrons * fmin(image.light, image.peak * s->binning * s->binning);
     }
     s->body_sigma = b->sigma;
-    double neighbours = b->one_pose || b->blurred ? NEIGHBOURS : NEIGHBOURS_IN_POSES;
-    s->chord_error = neighbours * image.error_e / fmax(s->last_read_e, 1e-9);
+    s->chord_error = neighbours_of(b) * image.error_e / fmax(s->last_read_e, 1e-9);
     return bst_extended_source_spread(ctx, &s->points, s->stretch, &s->nodes);
 }

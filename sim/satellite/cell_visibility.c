@@ -5,8 +5,9 @@
 
 #include "sim/satellite/visible_surface.h"
 
-/* Corners of a polygon within a cell, at most; others are left out. */
-enum { CORNERS = 64 };
+/* Corners of a polygon within a cell, at most; others are left out. A disc of half a pixel whose
+ * border is right to 1e-5 px has 410, and some more to have as many for each side of the model. */
+enum { CORNERS = 500 };
 
 /* Overlaps narrower than that, in cells, are none: coordinates are floats. */
 static const double SLIVER = 1e-6;
@@ -14,10 +15,10 @@ static const double SLIVER = 1e-6;
 /* A fragment that is compared with the others of its cell. */
 typedef struct bst_cell_polygon {
     const bst_surface_fragment *from;
-    bst_point2 p[CORNERS];
     int count, order;       /* order: of adding */
     double low[2], high[2]; /* box */
     double least_m, most_m; /* nearness */
+    bst_point2 p[CORNERS];
 } bst_cell_polygon;
 
 static double nearness(const bst_nearness *n, bst_point2 p) {

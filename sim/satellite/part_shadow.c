@@ -50,26 +50,26 @@ static void look_through_rim(bst_satellite_pose *p, const bst_pose_view *v, int 
 }
 
 double bst_part_shadow_lit(bst_satellite_pose *p, int view, int facet, uint64_t hiders,
-                           const bst_vec3 corner[4], bst_point2 flat[4]) {
+                           const bst_vec3 *corner, int count, bst_point2 *flat) {
     const bst_satellite *s = p->satellite;
     const bst_pose_view *v = &p->views[view];
     const bst_facet *f = &s->facets[facet];
-    bst_point2 start[4];
-    int count = 0;
-    for (int i = 0; i < 4; i++) {
+    bst_point2 start[BST_POLYGON_CORNERS_MAX];
+    int left = 0, quarter = count / 4;
+    for (int i = 0; i < count; i++) {
         flat[i] = (bst_point2){bst_vec3_dot(corner[i], v->x), bst_vec3_dot(corner[i], v->y)};
     }
-    double area = bst_polygon_area(flat, 4);
-    for (int i = 0; i < 4; i++) { /* counter-clockwise, without corners that are the same */
-        bst_point2 q = flat[area < 0.0 ? 3 - i : i];
-        if (count == 0 || q.x != start[count - 1].x || q.y != start[count - 1].y) {
-            start[count++] = q;
+    double area = bst_polygon_area(flat, count);
+    for (int i = 0; i < count; i++) { /* counter-clockwise, without corners that are the same */
+        bst_point2 q = flat[area < 0.0 ? count - 1 - i : i];
+        if (left == 0 || q.x != start[left - 1].x || q.y != start[left - 1].y) {
+            start[left++] = q;
         }
     }
-    bst_vec3 normal =
-        bst_vec3_cross(bst_vec3_sub(corner[2], corner[0]), bst_vec3_sub(corner[3], corner[1]));
+    bst_vec3 normal = bst_vec3_cross(bst_vec3_sub(corner[2 * quarter], corner[0]),
+                                     bst_vec3_sub(corner[3 * quarter], corner[quarter]));
     normal = bst_vec3_dot(normal, v->z) < 0.0 ? bst_vec3_scale(normal, -1.0) : normal;
-    bst_polygon_clip_start(&p->clip, start, count);
+    bst_polygon_clip_start(&p->clip, start, left);
     for (int o = 0; o < s->occluder_count && hiders >> o > 0; o++) {
         if (!(hiders >> o & 1)) {
             continue;

@@ -1,11 +1,11 @@
-/* Shadows on parts of curved surfaces, which are finer than the model's facets. Internal to
- * sim/satellite. */
+/* Shadows on parts of curved surfaces, and on plane facets with a round border, which are finer
+ * than the model's facets. Internal to sim/satellite. */
 #ifndef BST_SATELLITE_PART_SHADOW_H
 #define BST_SATELLITE_PART_SHADOW_H
 
 #include "sim/satellite/pose.h"
 
-/* Finds the bodies that may shadow the parts of a facet of a curved surface.
+/* Finds the bodies that may shadow a facet, or the parts of one of a curved surface.
  *
  * Given:     view   that bst_pose_look prepared toward the light
  * Returned:  *hiders  set of bodies
@@ -15,10 +15,10 @@ bool bst_part_shadow_hiders(bst_satellite_pose *pose, int view, int facet, uint6
 
 /* Fraction of a part of that facet that the light reaches, of its area as seen from there.
  *
- * Given:     corner  [4] of the part, body frame
- * Returned:  flat  [4] the corners along the view's x and y; pose->clip has the lit pieces in the
- *                  same coordinates if the fraction is between 0 and 1 */
+ * Given:     corner  [count] of the part, convex, body frame; at most BST_POLYGON_CORNERS_MAX
+ * Returned:  flat  [count] the corners along the view's x and y; pose->clip has the lit pieces in
+ *                  the same coordinates if the fraction is between 0 and 1 */
 double bst_part_shadow_lit(bst_satellite_pose *pose, int view, int facet, uint64_t hiders,
-                           const bst_vec3 corner[4], bst_point2 flat[4]);
+                           const bst_vec3 *corner, int count, bst_point2 *flat);
 
 #endif

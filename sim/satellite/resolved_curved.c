@@ -287,7 +287,7 @@ static bst_status add_lit_part(bst_ctx *ctx, const bst_resolved_adding *a, const
     double lit = split ? 1.0 : p->lit[0];
     if (p->by_part && p->hiders != 0 && s.sun > 0.0) {
         double fraction =
-            bst_part_shadow_lit(a->pose, 0, p->facet, p->hiders, part.corner, part.flat);
+            bst_part_shadow_lit(a->pose, 0, p->facet, p->hiders, part.corner, 4, part.flat);
         split = fraction > 0.0 && fraction < 1.0;
         lit = split ? 1.0 : fraction;
     }

@@ -3,6 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/satellite/part_shadow.h"
+#include "sim/satellite/polygon_cut.h"
+
 bst_point2 bst_resolved_project(const bst_resolved_adding *a, bst_vec3 p, double *depth_m) {
     bst_vec3 q = bst_vec3_add(a->view->origin_m, bst_mat3_mul_vec(&a->image_from_body, p));
     double f = a->per_m / q.z;
@@ -245,6 +248,73 @@ static bst_status add_pieces(bst_ctx *ctx, const bst_resolved_adding *a, int fac
     return BST_OK;
 }
 
+/* Sets a convex polygon that contains a facet with a round border: its own corners, by the sagitta
+ * farther out. */
+static int around_facet(const bst_resolved_adding *a, int facet, bst_vec3 *corner) {
+    int count = bst_plane_facet_corners(a->pose, &a->r->places, facet, 1, corner);
+    bst_vec3 middle = {0};
+    double step = 2.0 * BST_PI / count;
+    for (int i = 0; i < count; i++) {
+        middle = bst_vec3_axpy(middle, 1.0 / count, corner[i]);
+    }
+    for (int i = 0; i < count; i++) {
+        bst_vec3 r = bst_vec3_sub(corner[i], middle);
+        corner[i] = bst_vec3_axpy(middle, 1.0 + step * step / 8.0, r);
+    }
+    return count;
+}
+
+/* Makes a polygon counter-clockwise. */
+static void turn_left(bst_point2 *p, int count) {
+    bool right = bst_polygon_area(p, count) < 0.0;
+    for (int i = 0, k = count - 1; i < k && right; i++, k--) {
+        bst_point2 swap = p[i];
+        p[i] = p[k];
+        p[k] = swap;
+    }
+}
+
+/* Adds what a light reaches of a facet with a round border, of which the model's corners are not
+ * those of the image.
+ *
+ * Returned:  *done  false: too many bodies */
+static bst_status add_round_pieces(bst_ctx *ctx, const bst_resolved_adding *a, int facet, int view,
+                                   const bst_resolved_face *f, double light, bool *done) {
+    uint64_t hiders;
+    bst_vec3 corner[BST_POLYGON_CORNERS_MAX], normal = a->pose->normals[facet];
+    bst_point2 flat[BST_POLYGON_CORNERS_MAX], border[BST_COVERAGE_CORNERS_MAX];
+    bst_point2 at[BST_POLYGON_CORNERS_MAX], kept[BST_POLYGON_INTERSECTION_MAX];
+    bst_point2 work[BST_POLYGON_INTERSECTION_MAX];
+    *done = bst_part_shadow_hiders(a->pose, view, facet, &hiders);
+    if (!*done) {
+        return BST_OK;
+    }
+    int count = around_facet(a, facet, corner);
+    (void)bst_part_shadow_lit(a->pose, view, facet, hiders, corner, count, flat);
+    const bst_polygon_clip *clip = &a->pose->clip;
+    const bst_pose_view *v = &a->pose->views[view];
+    double in = bst_vec3_dot(normal, v->z);
+    memcpy(border, f->corner, (size_t)f->count * sizeof *border);
+    turn_left(border, f->count);
+    for (int n = 0; n < clip->piece_count; n++) {
+        const bst_polygon_piece *piece = &clip->pieces[n];
+        int corners = piece->count;
+        if (corners < 3 || corners + f->count > BST_POLYGON_INTERSECTION_MAX) {
+            continue;
+        }
+        for (int i = 0; i < corners; i++) {
+            bst_point2 p = clip->points[piece->first + i];
+            bst_vec3 q = bst_vec3_axpy(bst_vec3_scale(v->x, p.x), p.y, v->y);
+            double way = bst_vec3_dot(normal, bst_vec3_sub(corner[0], q)) / in, depth_m;
+            at[i] = bst_resolved_project(a, bst_vec3_axpy(q, way, v->z), &depth_m);
+        }
+        turn_left(at, corners);
+        corners = bst_polygon_intersection(at, corners, border, f->count, work, kept);
+        BST_TRY(bst_resolved_add_lit(ctx, a->r, f, kept, corners, light));
+    }
+    return BST_OK;
+}
+
 bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a,
                                       const bst_resolved_face *f, double uniform, bool pieces) {
     bst_resolved *r = a->r;
@@ -288,6 +358,9 @@ int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double ang
     return (int)fmin(ceil(parts - 1e-6), most);
 }
 
+/* Corners of a plane facet with a round border, at most: they fit with those of a lit piece. */
+enum { ROUND_CORNERS = BST_POLYGON_INTERSECTION_MAX - BST_POLYGON_CORNERS_MAX };
+
 bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
                                         bst_resolved_face *f) {
     bst_resolved *r = a->r;
@@ -299,13 +372,9 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
         double angle = 2.0 * BST_PI / from->count;
         double side_m = bst_vec3_norm(bst_vec3_sub(
             a->pose->vertices[r->satellite->corner[from->first + 1]], a->pose->vertices[first]));
-        around = bst_resolved_parts(a, side_m / angle, angle, a->pose->vertices[first], true,
-                                    BST_RESOLVED_PARTS_MAX);
-        int most = BST_COVERAGE_CORNERS_MAX / from->count;
-        around = around < most ? around : most;
-    }
-    if (from->count * around > BST_COVERAGE_CORNERS_MAX) {
-        around = 1;
+        int most = ROUND_CORNERS / from->count;
+        most = most < 1 ? 1 : most < BST_RESOLVED_PARTS_MAX ? most : BST_RESOLVED_PARTS_MAX;
+        around = bst_resolved_parts(a, side_m / angle, angle, a->pose->vertices[first], true, most);
     }
     int count = bst_plane_facet_corners(a->pose, &r->places, facet, around, corner);
     if (!bst_resolved_make_face(a, corner, count, normal, f)) {
@@ -335,7 +404,13 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
                 BST_TRY(bst_resolved_clear_lit(ctx, r, f));
                 pieces = true;
             }
-            BST_TRY(add_pieces(ctx, a, facet, f, light[view]));
+            bool done = false;
+            if (around > 1) {
+                BST_TRY(add_round_pieces(ctx, a, facet, view, f, light[view], &done));
+            }
+            if (!done) {
+                BST_TRY(add_pieces(ctx, a, facet, f, light[view]));
+            }
         }
     }
     return bst_resolved_add_fragments(ctx, a, f, s.uniform, pieces);

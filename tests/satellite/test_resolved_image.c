@@ -318,10 +318,40 @@ static void test_allowed_limb(void **state) {
     bst_test_model_close(&m);
 }
 
+/* Round borders of facets with so many sides that few parts of each are left say what they reach.
+ */
+static void test_reached_border(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_test_model m = bst_test_model_open(
+        "{\"materials\": [{\"name\": \"m\", \"diffuse\": 0.5}], \"parts\": [{\"name\": \"c\", "
+        "\"kind\": \"cylinder\", \"radius_m\": 1, \"length_m\": 1, \"segments\": 96, "
+        "\"material\": \"m\"}]}");
+    bst_resolved *r;
+    bst_resolved_gain gain[1] = {{.sun = 1.0}};
+    bst_resolved_light light = {.sun = {0, 0, 1}, .gain = gain};
+    bst_resolved_view view = look_from((bst_vec3){0, 0, 1}, (bst_vec3){1, 0, 0}, 1e4, 1e-6);
+    double low[2], high[2];
+    view.limb_px = view.curved_px = 1e-6;
+    assert_true(bst_resolved_box(m.pose, &view, low, high));
+    bst_assert_ok(&ctx, bst_resolved_create(&ctx, m.satellite, &r));
+    bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r, low, high, 1.0));
+    bst_assert_ok(&ctx, bst_resolved_add(&ctx, r, m.pose, &view, &light, 1.0, NULL));
+    /* 16 parts for each of 96 sides: 1,536 corners of a circle of 100 px; 0.01 by the places of the
+     * model's corners */
+    double step = 2.0 * BST_PI / 1536.0;
+    bst_assert_close(bst_resolved_image_of(r)->reached_px[1] / (100.0 * step * step / 12.0), 1.0,
+                     0.01);
+    bst_resolved_free(r);
+    bst_test_model_close(&m);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_agrees_with_flux), cmocka_unit_test(test_perspective),
-        cmocka_unit_test(test_light), cmocka_unit_test(test_second_moments),
-        cmocka_unit_test(test_allowed_limb)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_agrees_with_flux),
+                                       cmocka_unit_test(test_perspective),
+                                       cmocka_unit_test(test_light),
+                                       cmocka_unit_test(test_second_moments),
+                                       cmocka_unit_test(test_allowed_limb),
+                                       cmocka_unit_test(test_reached_border)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,9 @@
 /* Images of the satellites of scenarios/satellites at a tolerance: the predicted error is within
  * the tolerance, and that against images of a tenth of the tolerance within the prediction.
  *
- * Usage: test_library_images [slow [satellite]] */
+ * Usage: test_library_images [slow|quick [satellite [set [first [last]]]]]
+ * A set other than 0 takes other directions of the satellite and the Sun;
+ * first and last name the views of the slow form. */
 #include <dirent.h>
 
 #include "scenegen/renderer.h"
@@ -10,7 +12,7 @@
 #include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
 
-enum { SIDE_MAX = 256 };
+enum { SIDE_MAX = 256, VIEWS = 27, QUICK = 18 };
 
 static const double RANGE_M = 1e5, TOLERANCE_SIGMA = 0.1, FINE_SIGMA = 0.01;
 
@@ -100,6 +102,7 @@ static int compare_numbers(const void *a, const void *b) {
 
 static const char *wanted;
 static bool slow;
+static int direction_set, first_view, last_view = VIEWS - 1;
 
 /* View number n: three sizes; at rest, turning by 4 % of a revolution, and sliding by 5 px while
  * the rim turns by 1 px; three lights; directions that differ. */
@@ -111,6 +114,11 @@ static view view_of(int n) {
     v.slide_px = motion == 2 ? 5.0 : 0.0;
     v.attitude = (bst_vec3){0.3 + 0.2 * n, 0.7 * n, 0.1};
     v.sun = (bst_vec3){0.7 - 0.3 * (n % 5), -0.4 + 0.1 * (n % 7), -0.6 + 0.2 * (n % 4)};
+    if (direction_set > 0) {
+        double k = 27.0 * direction_set + n; /* irrational steps: no direction twice */
+        v.attitude = (bst_vec3){2.0 * sin(1.618 * k), 2.0 * sin(2.414 * k), 2.0 * sin(3.303 * k)};
+        v.sun = (bst_vec3){sin(4.236 * k), sin(5.193 * k), sin(6.162 * k) - 0.3};
+    }
     return v;
 }
 
@@ -146,7 +154,7 @@ static bool judge(fixture *f, const bst_satellite *satellite, const char *name, 
 }
 
 static void test_library(void **state) {
-    enum { VIEWS = 27, QUICK = 18, SHARE = 3, MOST = 1024 };
+    enum { SHARE = 3, MOST = 1024 };
     fixture *f = *state;
     static double ratios[MOST];
     int count = 0, broken = 0, satellites = 0;
@@ -163,8 +171,8 @@ static void test_library(void **state) {
         bst_satellite *satellite;
         bst_assert_ok(&f->ctx, bst_satellite_load(&f->ctx, path, &satellite));
         satellites++;
-        for (int n = slow ? 0 : entry->d_name[0] % SHARE; n < (slow ? VIEWS : QUICK);
-             n += slow ? 1 : SHARE + 4) {
+        for (int n = slow ? first_view : (entry->d_name[0] + direction_set) % SHARE;
+             n <= (slow ? last_view : QUICK - 1); n += slow ? 1 : SHARE + 4) {
             double ratio;
             broken += !judge(f, satellite, entry->d_name, n, &ratio);
             if (ratio > 0.0 && count < MOST) {
@@ -183,7 +191,10 @@ static void test_library(void **state) {
 
 int main(int argc, char **argv) {
     slow = argc > 1 && strcmp(argv[1], "slow") == 0;
-    wanted = argc > 2 ? argv[2] : NULL;
+    wanted = argc > 2 && argv[2][0] ? argv[2] : NULL;
+    direction_set = argc > 3 ? atoi(argv[3]) : 0;
+    first_view = argc > 4 ? atoi(argv[4]) : 0;
+    last_view = argc > 5 ? atoi(argv[5]) : VIEWS - 1;
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_library)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
