@@ -143,8 +143,7 @@ bool bst_target_is_expected(const bst_target_params *params, const bst_target_cu
     if (!cue->valid) {
         return false;
     }
-    return target ? !is_released(target, params, cue, track)
-                  : misfit(params, cue, track).fits;
+    return target ? !is_released(target, params, cue, track) : misfit(params, cue, track).fits;
 }
 
 /* Stores the target's state for a later re-selection. */
@@ -165,14 +164,20 @@ typedef struct candidates {
     double lowest, lowest_chi2;  /* chi2 + log_det of the best; its chi2 */
     double next;                 /* chi2 + log_det of the second */
     double sum;                  /* of all likelihoods over that of the best */
-    bool seen; /* the best is likelier than that the cue's object has no track */
+    bool seen;                   /* the best is likelier than that the cue's object has no track */
+    bool compared;               /* the target was */
 } candidates;
 
 /* Misfit of a track to the cue and, if not NULL, to the predicted state of a lost target, which
- * must be near; the catalogue's other objects add to chi2 + log_det in log_det. */
+ * must be near; the catalogue's other objects add to chi2 + log_det in log_det. The target itself
+ * is compared even if a merge disturbed its motion: else any other track would be certain. */
 static bst_target_fit misfit_of_all(const bst_target_params *params, const bst_target_cue *cue,
-                                    const bst_sky_state *memory, const bst_mtt_track *track) {
+                                    const bst_sky_state *memory, const bst_mtt_track *track,
+                                    int64_t target_id) {
     bst_target_fit fit = bst_target_misfit(params, cue, track);
+    if (track->id == target_id && cue->valid && rate_is_known(params, track)) {
+        fit = misfit(params, cue, track);
+    }
     if (memory && fit.chi2 < INFINITY) {
         double distance2 = bst_sky_distance2(memory, &track->state);
         if (!(distance2 <= params->dormant_gate_chi2)) {
@@ -193,12 +198,15 @@ static bool is_rival(bst_target_fit fit, double other) {
 
 /* Compares all tracks with the cue.
  *
- * Given:     memory  predicted state of a lost target, which binds the choice; NULL: none */
+ * Given:     memory     predicted state of a lost target, which binds the choice; NULL: none
+ *            target_id  0: none */
 static candidates compare(const bst_target_params *params, const bst_target_cue *cue,
-                          const bst_sky_state *memory, const bst_mtt_track *tracks, int count) {
+                          const bst_sky_state *memory, int64_t target_id,
+                          const bst_mtt_track *tracks, int count) {
     candidates c = {.lowest = INFINITY, .lowest_chi2 = INFINITY, .next = INFINITY, .seen = true};
     for (int i = 0; i < count; i++) {
-        bst_target_fit fit = misfit_of_all(params, cue, memory, &tracks[i]);
+        bst_target_fit fit = misfit_of_all(params, cue, memory, &tracks[i], target_id);
+        c.compared = c.compared || (tracks[i].id == target_id && fit.chi2 < INFINITY);
         if (fit.fits && fit.chi2 + fit.log_det < c.lowest) {
             c.best = &tracks[i];
             c.lowest = fit.chi2 + fit.log_det;
@@ -210,7 +218,7 @@ static candidates compare(const bst_target_params *params, const bst_target_cue 
     }
     c.sum = 1.0;
     for (int i = 0; i < count; i++) {
-        bst_target_fit fit = misfit_of_all(params, cue, memory, &tracks[i]);
+        bst_target_fit fit = misfit_of_all(params, cue, memory, &tracks[i], target_id);
         double misfit = fit.chi2 + fit.log_det;
         if (&tracks[i] == c.best || !(misfit < INFINITY)) {
             continue;
@@ -271,9 +279,9 @@ static void take_target(bst_target *target, const bst_target_params *params,
  * one did. */
 static bool replace(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                     double seconds, const bst_mtt_track *tracks, int count) {
-    candidates c = compare(params, cue, NULL, tracks, count);
-    if (!c.best) {
-        return false; /* without a cue, or no track fits: nothing new */
+    candidates c = compare(params, cue, NULL, target->id, tracks, count);
+    if (!c.best || !c.compared) {
+        return false; /* without a cue, no track fits, or the target's rate is not known */
     }
     bool replaced =
         c.best->id != target->id && 1.0 / c.sum > BST_TARGET_CERTAIN && is_mature(params, &c);
@@ -339,7 +347,7 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
     if (bound) {
         bst_sky_predict(&memory, seconds - target->memory_seconds, params->memory_noise_rad2ps3);
     }
-    candidates c = compare(params, cue, bound ? &memory : NULL, tracks, count);
+    candidates c = compare(params, cue, bound ? &memory : NULL, 0, tracks, count);
     if (is_mature(params, &c) && c.seen &&
         (0.5 * (c.next - c.lowest) >= params->margin || c.best->hits >= params->margin_hits)) {
         const bst_target before = *target;
@@ -351,7 +359,7 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
             target->probability = rival ? before.rival_probability : before.probability;
             target->rival_probability = rival ? before.probability : before.rival_probability;
             target->rival_seconds = before.rival_seconds;
-            c = compare(params, cue, NULL, tracks, count);
+            c = compare(params, cue, NULL, target->id, tracks, count);
             set_probability(target, params, seconds, &c);
         }
     }
