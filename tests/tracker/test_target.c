@@ -417,6 +417,11 @@ static void limits_do_not_make_certain(void **state) {
     bst_target_step(&target, &params, &cue, 1.0, t, 2);
     assert_int_equal(target.id, 1);
     bst_assert_close(target.probability, 0.5, 1e-12);
+    bst_mtt_track wrong[2] = {make_track(1, 10, 1.7, 13), t[1]}; /* but it can be refuted */
+    wrong[0].chi2 = 80;
+    bst_target other = target;
+    bst_target_step(&other, &params, &cue, 2.0, wrong, 2);
+    assert_int_equal(other.id, 2);
     t[0].state.covariance[2][2] = AS * AS; /* nor a rate that is not known */
     bst_target_step(&target, &params, &cue, 2.0, t, 2);
     assert_int_equal(target.id, 1);
