@@ -31,7 +31,7 @@ static double weight_of(const bst_identity_params *params, const bst_mtt_track *
                                    .v_mag = object->v_mag,
                                    .v_mag_sigma = object->v_mag_sigma};
     bst_target_fit fit = bst_target_misfit(&params->fit, &as_cue, track);
-    if (!(fit.chi2 < INFINITY)) {
+    if (!fit.fits) {
         return 0.0;
     }
     double odds = params->detection_probability / (1.0 - params->detection_probability);

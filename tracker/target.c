@@ -4,17 +4,20 @@
 
 #include "tracker/identity.h"
 
-/* Adds x^T P^-1 x and ln det P of a 2-vector to a target misfit; INFINITY for an invalid P or a
- * misfit beyond `limit`. */
+/* Log-likelihood ratio from which a track beyond a limit is no rival. */
+static const double NO_RIVAL = 6.9; /* ln 1000: no decision depends on less */
+
+/* Adds x^T P^-1 x and ln det P of a 2-vector to a target misfit; INFINITY for an invalid P. */
 static void add2(bst_target_fit *fit, const double x[2], double p11, double p12, double p22,
                  double limit) {
     double det = p11 * p22 - p12 * p12;
     double chi2 = (p22 * x[0] * x[0] - 2.0 * p12 * x[0] * x[1] + p11 * x[1] * x[1]) / det;
-    if (det > 0.0 && chi2 <= limit) {
+    if (det > 0.0) {
+        fit->fits = fit->fits && chi2 <= limit;
         fit->chi2 += chi2;
         fit->log_det += log(det);
     } else {
-        fit->chi2 = INFINITY;
+        *fit = (bst_target_fit){.chi2 = INFINITY};
     }
 }
 
@@ -66,7 +69,7 @@ static double rate_chi2(const bst_mtt_track *track, bst_vec3 rate, double more) 
 static bst_target_fit misfit(const bst_target_params *params, const bst_target_cue *cue,
                              const bst_mtt_track *track) {
     const bst_sky_state *s = &track->state;
-    bst_target_fit fit = {.chi2 = 0.0};
+    bst_target_fit fit = {.fits = true};
     double x[2], p[3];
     in_axes(track, rate_departure(cue, track), cue_variance(params, cue), x, p);
     add2(&fit, x, p[0], p[1], p[2], params->rate_chi2);
@@ -80,7 +83,8 @@ static bst_target_fit misfit(const bst_target_params *params, const bst_target_c
         /* 0.1 mag: a track is never better known than its photometric zero point */
         double v = cue->v_mag_sigma * cue->v_mag_sigma + track->v_mag_variance + 0.01;
         double m = track->v_mag - cue->v_mag;
-        fit.chi2 += m * m / v <= params->magnitude_chi2 ? m * m / v : INFINITY;
+        fit.fits = fit.fits && m * m / v <= params->magnitude_chi2;
+        fit.chi2 += m * m / v;
         fit.log_det += log(v);
     }
     return fit;
@@ -139,8 +143,7 @@ bool bst_target_is_expected(const bst_target_params *params, const bst_target_cu
     if (!cue->valid) {
         return false;
     }
-    return target ? !is_released(target, params, cue, track)
-                  : misfit(params, cue, track).chi2 < INFINITY;
+    return target ? !is_released(target, params, cue, track) : misfit(params, cue, track).fits;
 }
 
 /* Stores the target's state for a later re-selection. */
@@ -154,51 +157,79 @@ static void store_target(bst_target *target, const bst_target_cue *cue, double s
     }
 }
 
-/* The tracks that fit the cue, and their likelihoods relative to the best one's. */
+/* Comparison of the tracks with the cue. */
 typedef struct candidates {
-    const bst_mtt_track *best, *second; /* NULL: none */
-    double lowest, lowest_chi2;         /* chi2 + log_det of the best; its chi2 */
-    double next;                        /* chi2 + log_det of the second */
-    double sum;                         /* of all likelihoods over that of the best */
-    bool seen; /* the best is likelier than that the cue's object has no track */
+    const bst_mtt_track *best;   /* the likeliest of those that fit the cue; NULL: none */
+    const bst_mtt_track *second; /* the likeliest other one that is a rival; NULL: none */
+    double lowest, lowest_chi2;  /* chi2 + log_det of the best; its chi2 */
+    double next;                 /* chi2 + log_det of the second */
+    double sum;                  /* of all likelihoods over that of the best */
+    bool seen;                   /* the best is likelier than that the cue's object has no track */
+    bool compared;               /* the target was */
 } candidates;
+
+/* Misfit of a track to the cue and, if not NULL, to the predicted state of a lost target, which
+ * must be near; the catalogue's other objects add to chi2 + log_det in log_det. The target itself
+ * is compared even if a merge disturbed its motion: else any other track would be certain. */
+static bst_target_fit misfit_of_all(const bst_target_params *params, const bst_target_cue *cue,
+                                    const bst_sky_state *memory, const bst_mtt_track *track,
+                                    int64_t target_id) {
+    bst_target_fit fit = bst_target_misfit(params, cue, track);
+    if (track->id == target_id && cue->valid && rate_is_known(params, track)) {
+        fit = misfit(params, cue, track);
+    }
+    if (memory && fit.chi2 < INFINITY) {
+        double distance2 = bst_sky_distance2(memory, &track->state);
+        if (!(distance2 <= params->dormant_gate_chi2)) {
+            return (bst_target_fit){.chi2 = INFINITY};
+        }
+        fit.chi2 += distance2;
+    }
+    if (cue->identity && fit.chi2 < INFINITY) {
+        fit.log_det -= 2.0 * bst_identity_log_unexplained(cue->identity, track->id, cue->object);
+    }
+    return fit;
+}
+
+/* True if a track is a rival of one with chi2 + log_det `other`: it fits, or nearly as well. */
+static bool is_rival(bst_target_fit fit, double other) {
+    return fit.fits || fit.chi2 + fit.log_det < other + 2.0 * NO_RIVAL;
+}
 
 /* Compares all tracks with the cue.
  *
- * Given:     memory  predicted state of a lost target, which binds the choice; NULL: none */
+ * Given:     memory     predicted state of a lost target, which binds the choice; NULL: none
+ *            target_id  0: none */
 static candidates compare(const bst_target_params *params, const bst_target_cue *cue,
-                          const bst_sky_state *memory, const bst_mtt_track *tracks, int count) {
-    candidates c = {.lowest = INFINITY, .lowest_chi2 = INFINITY, .next = INFINITY};
+                          const bst_sky_state *memory, int64_t target_id,
+                          const bst_mtt_track *tracks, int count) {
+    candidates c = {.lowest = INFINITY, .lowest_chi2 = INFINITY, .next = INFINITY, .seen = true};
     for (int i = 0; i < count; i++) {
-        bst_target_fit fit = bst_target_misfit(params, cue, &tracks[i]);
-        if (memory && fit.chi2 < INFINITY) {
-            double distance2 = bst_sky_distance2(memory, &tracks[i].state);
-            fit.chi2 = distance2 <= params->dormant_gate_chi2 ? fit.chi2 + distance2 : INFINITY;
-        }
-        double misfit = fit.chi2 + fit.log_det;
-        if (cue->identity && misfit < INFINITY) {
-            misfit -= 2.0 * bst_identity_log_unexplained(cue->identity, tracks[i].id, cue->object);
-        }
-        if (!(misfit < INFINITY)) {
-            continue;
-        }
-        if (misfit < c.lowest) {
-            c.sum = (c.best ? c.sum * exp(-0.5 * (c.lowest - misfit)) : 0.0) + 1.0;
-            c.second = c.best;
-            c.next = c.lowest;
+        bst_target_fit fit = misfit_of_all(params, cue, memory, &tracks[i], target_id);
+        c.compared = c.compared || (tracks[i].id == target_id && fit.chi2 < INFINITY);
+        if (fit.fits && fit.chi2 + fit.log_det < c.lowest) {
             c.best = &tracks[i];
-            c.lowest = misfit;
+            c.lowest = fit.chi2 + fit.log_det;
             c.lowest_chi2 = fit.chi2;
-        } else {
-            c.sum += exp(-0.5 * (misfit - c.lowest));
-            if (misfit < c.next) {
-                c.second = &tracks[i];
-                c.next = misfit;
-            }
         }
     }
-    c.seen = true;
-    if (cue->identity && c.best && !memory) { /* the memory says that it has a track */
+    if (!c.best) {
+        return c;
+    }
+    c.sum = 1.0;
+    for (int i = 0; i < count; i++) {
+        bst_target_fit fit = misfit_of_all(params, cue, memory, &tracks[i], target_id);
+        double misfit = fit.chi2 + fit.log_det;
+        if (&tracks[i] == c.best || !(misfit < INFINITY)) {
+            continue;
+        }
+        c.sum += exp(-0.5 * (misfit - c.lowest));
+        if (misfit < c.next && is_rival(fit, c.lowest)) {
+            c.second = &tracks[i];
+            c.next = misfit;
+        }
+    }
+    if (cue->identity && !memory) { /* the memory says that it has a track */
         double unseen = cue->unseen_density / bst_identity_scale(cue, c.best) * exp(0.5 * c.lowest);
         c.seen = unseen <= 1.0;
         c.sum += unseen;
@@ -248,9 +279,9 @@ static void take_target(bst_target *target, const bst_target_params *params,
  * one did. */
 static bool replace(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                     double seconds, const bst_mtt_track *tracks, int count) {
-    candidates c = compare(params, cue, NULL, tracks, count);
-    if (!c.best) {
-        return false; /* without a cue, or no track fits: nothing new */
+    candidates c = compare(params, cue, NULL, target->id, tracks, count);
+    if (!c.best || !c.compared) {
+        return false; /* without a cue, no track fits, or the target's rate is not known */
     }
     bool replaced =
         c.best->id != target->id && 1.0 / c.sum > BST_TARGET_CERTAIN && is_mature(params, &c);
@@ -277,16 +308,18 @@ static void reopen(bst_target *target, const bst_target_params *params, const bs
     }
 }
 
-/* True if a new track fits the cue, too. It counts as new until it has twice the hits at which it
- * would be chosen; and not once the target has left the cue by a manoeuvre. */
+/* True if a new track may be the cue's object, too. It counts as new until it has twice the hits at
+ * which it would be chosen; and not once the target has left the cue by a manoeuvre. */
 static bool has_new_rival(const bst_target_params *params, const bst_target_cue *cue,
                           const bst_mtt_track *kept, const bst_mtt_track *tracks, int count) {
+    bst_target_fit own = bst_target_misfit(params, cue, kept);
     bool rival = false;
-    for (int i = 0; i < count && !rival; i++) {
-        rival = tracks[i].id != kept->id && tracks[i].hits < 2 * params->margin_hits &&
-                bst_target_misfit(params, cue, &tracks[i]).chi2 < INFINITY;
+    for (int i = 0; own.fits && i < count && !rival; i++) {
+        if (tracks[i].id != kept->id && tracks[i].hits < 2 * params->margin_hits) {
+            rival = is_rival(bst_target_misfit(params, cue, &tracks[i]), own.chi2 + own.log_det);
+        }
     }
-    return rival && bst_target_misfit(params, cue, kept).chi2 < INFINITY;
+    return rival;
 }
 
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
@@ -314,7 +347,7 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
     if (bound) {
         bst_sky_predict(&memory, seconds - target->memory_seconds, params->memory_noise_rad2ps3);
     }
-    candidates c = compare(params, cue, bound ? &memory : NULL, tracks, count);
+    candidates c = compare(params, cue, bound ? &memory : NULL, 0, tracks, count);
     if (is_mature(params, &c) && c.seen &&
         (0.5 * (c.next - c.lowest) >= params->margin || c.best->hits >= params->margin_hits)) {
         const bst_target before = *target;
@@ -326,7 +359,7 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
             target->probability = rival ? before.rival_probability : before.probability;
             target->rival_probability = rival ? before.probability : before.rival_probability;
             target->rival_seconds = before.rival_seconds;
-            c = compare(params, cue, NULL, tracks, count);
+            c = compare(params, cue, NULL, target->id, tracks, count);
             set_probability(target, params, seconds, &c);
         }
     }

@@ -75,9 +75,8 @@ typedef struct bst_target {
 
 /* Result of bst_target_misfit. */
 typedef struct bst_target_fit {
-    /* sum of the terms; INFINITY if one exceeds its limit, the track is not confirmed, or its rate
-     * is not accurate enough */
-    double chi2;
+    bool fits;   /* each term is within its limit */
+    double chi2; /* sum of the terms; INFINITY if the track cannot be compared */
     /* sum of the log determinants of their covariances: chi2 + log_det is twice the negative
      * log-likelihood up to a constant */
     double log_det;
@@ -85,8 +84,8 @@ typedef struct bst_target_fit {
 
 /* Misfit of a track to the cue over direction, rate and brightness.
  *
- * Returned:  chi2 INFINITY if there is no cue, or if the track is stationary, tentative, or its
- *            rate is not known */
+ * Returned:  `fits` false and chi2 INFINITY if there is no cue, or if the track is stationary,
+ *            tentative, moves unlike any object, or its rate is not known */
 bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
                                  const bst_mtt_track *track);
 
@@ -111,8 +110,9 @@ bool bst_target_is_expected(const bst_target_params *params, const bst_target_cu
  *            rate gradually: a target that is detected and shares no detection may change its rate
  *            freely, within the gate of its filter. Otherwise a track is chosen by the cue and,
  *            after a loss, by the lost target's prediction. Without a cue no new target is chosen.
- *            Of several tracks that fit the cue, each has the probability
- *            exp(-(chi2 + log_det)/2) over the sum of all; with a comparison with the catalogue
+ *            Of several tracks, each has the probability exp(-(chi2 + log_det)/2) over the sum of
+ *            all, also of those beyond a limit: if the cue is far off its object, that object's
+ *            track fits hardly better than others. With a comparison with the catalogue
  *            times the odds that no other object explains the track, and the sum includes
  *            that of no track, which no chosen track may be below. While the target's is not
  *            certain, it is ambiguous, and another track replaces it as soon as that one is

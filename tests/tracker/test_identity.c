@@ -2,12 +2,13 @@
  * the target at the end is that one, or the stated probability says that it may not be.
  *
  *     test_identity             the short form, as a test
- *     test_identity run SEEDS   figures of each rate, and the reliability of the probabilities */
+ *     test_identity run SEEDS [FIRST]   figures of each rate from seed FIRST (0) on, and the
+ *                               reliability of the probabilities with their standard errors */
 #include "tests/tracker/close_scenes.h"
 #include "tracker/target.h"
 
 #define AS BST_ARCSEC_RAD
-enum { BINS = 5 };
+enum { BINS = 10 };
 
 /* As of the tracker's default configuration. */
 static const bst_target_params target_params = {.direction_chi2 = 18.4,
@@ -30,7 +31,7 @@ static const close_kind pair = {"identity", 2, 0.0, 0.0, true, 15.0, 15.0, 0.05,
 
 typedef struct tally {
     int runs, none, right, ambiguous, silently_wrong;
-    int count[BINS], correct[BINS]; /* by stated probability: from 0.5, 0.6 ... */
+    int count[BINS], correct[BINS]; /* by stated probability: from 0, 0.1 ... */
     double sum[BINS];
 } tally;
 
@@ -48,8 +49,17 @@ static void open_pair(close_scene *s, double rate, uint64_t seed) {
                                    vx + rate * cos(across), vy + rate * sin(across), 15.0};
 }
 
+/* A cue whose direction errs by an oscillation, as the place along an orbit does, and whose rate is
+ * that of its direction: in each frame both have the stated errors and are independent. (With a
+ * constant error of the direction and another one of the rate, the cue would know the true rate
+ * from two of its directions.) */
 static bst_target_cue make_cue(const close_scene *s, int frame, const double error[4]) {
-    double x, y, later_x, later_y;
+    double x, y, later_x, later_y, d[2], r[2];
+    double phase = CUE_RATE_SIGMA_RADPS / CUE_SIGMA_RAD * (frame - CLOSE_FRAMES / 2);
+    for (int k = 0; k < 2; k++) {
+        d[k] = CUE_SIGMA_RAD * (error[k] * cos(phase) + error[k + 2] * sin(phase));
+        r[k] = CUE_RATE_SIGMA_RADPS * (error[k + 2] * cos(phase) - error[k] * sin(phase));
+    }
     close_place(&s->objects[0], frame, &x, &y);
     close_place(&s->objects[0], frame + 1, &later_x, &later_y);
     bst_vec3 truth = close_direction(x, y);
@@ -60,10 +70,8 @@ static bst_target_cue make_cue(const close_scene *s, int frame, const double err
                           .rate_sigma_radps = CUE_RATE_SIGMA_RADPS,
                           .v_mag = 15,
                           .v_mag_sigma = 1};
-    cue.direction = bst_tangent_exp(
-        truth, bst_tangent_vector(&axes, CUE_SIGMA_RAD * error[0], CUE_SIGMA_RAD * error[1]));
-    rate = bst_vec3_add(rate, bst_tangent_vector(&axes, CUE_RATE_SIGMA_RADPS * error[2],
-                                                 CUE_RATE_SIGMA_RADPS * error[3]));
+    cue.direction = bst_tangent_exp(truth, bst_tangent_vector(&axes, d[0], d[1]));
+    rate = bst_vec3_add(rate, bst_tangent_vector(&axes, r[0], r[1]));
     cue.rate_radps = bst_tangent_carry(truth, cue.direction, rate);
     return cue;
 }
@@ -83,8 +91,8 @@ static void judge(const close_scene *s, int frame, const bst_mtt *mtt, const bst
         off[i] = bst_vec3_angle(close_direction(x, y), track->state.direction);
     }
     bool right = off[0] < off[1];
-    int bin = (int)(10.0 * (target->probability - 0.5));
-    bin = bin < 0 ? 0 : bin < BINS ? bin : BINS - 1;
+    int bin = (int)(BINS * target->probability);
+    bin = bin < BINS ? bin : BINS - 1;
     out->right += right;
     out->ambiguous += target->ambiguous;
     out->silently_wrong += !right && !target->ambiguous;
@@ -130,8 +138,9 @@ static void print_tally(const char *name, const tally *t) {
            t->right, t->ambiguous, t->silently_wrong, t->none);
     for (int b = 0; b < BINS; b++) {
         if (t->count[b] > 0) {
-            printf("    stated %.3f: right %d of %d\n", t->sum[b] / t->count[b], t->correct[b],
-                   t->count[b]);
+            double n = t->count[b], share = (t->correct[b] + 1) / (n + 2);
+            printf("    stated %.3f: right %d of %d, %.3f +- %.3f\n", t->sum[b] / n, t->correct[b],
+                   t->count[b], t->correct[b] / n, sqrt(share * (1.0 - share) / n));
         }
     }
 }
@@ -149,12 +158,12 @@ static void add(tally *all, const tally *one) {
     }
 }
 
-static void run_rates(int seeds, bool print, tally *all) {
+static void run_rates(int first, int seeds, bool print, tally *all) {
     static const double rates[] = {0.1, 0.3, 1.0};
     memset(all, 0, sizeof *all);
     for (int r = 0; r < 3; r++) {
         tally one = {0};
-        for (int seed = 0; seed < seeds; seed++) {
+        for (int seed = first; seed < first + seeds; seed++) {
             cross(rates[r], (uint64_t)seed, &one);
         }
         add(all, &one);
@@ -173,15 +182,15 @@ static void run_rates(int seeds, bool print, tally *all) {
 static void short_form(void **state) {
     (void)state;
     tally all;
-    run_rates(20, true, &all);
+    run_rates(0, 20, true, &all);
     assert_int_equal(all.none, 0);
     assert_true(all.silently_wrong <= all.runs / 20);
 }
 
 int main(int argc, char **argv) {
-    if (argc == 3 && strcmp(argv[1], "run") == 0) {
+    if ((argc == 3 || argc == 4) && strcmp(argv[1], "run") == 0) {
         tally all;
-        run_rates(atoi(argv[2]), true, &all);
+        run_rates(argc == 4 ? atoi(argv[3]) : 0, atoi(argv[2]), true, &all);
         return 0;
     }
     const struct CMUnitTest tests[] = {cmocka_unit_test(short_form)};

@@ -391,6 +391,44 @@ static void ambiguity_is_resolved_by_time(void **state) {
     }
 }
 
+/* Neither a limit nor a disturbed motion makes the other of two like tracks certain. */
+static void limits_do_not_make_certain(void **state) {
+    (void)state;
+    bst_target_cue cue = make_cue();
+    bst_target target = {0};
+    /* limit: 1.76 arcsec/s */
+    bst_mtt_track t[2] = {make_track(1, 10, 1.75, 13), make_track(2, 10, 1.78, 13)};
+    t[0].hits = 12;
+    for (int k = 0; k < 2; k++) { /* a rival from the first frame on, and a new one */
+        target = (bst_target){0};
+        bst_target_step(&target, &params, &cue, 0.0, t, 2 - k);
+        bst_target_step(&target, &params, &cue, 1.0, t, 2);
+        assert_int_equal(target.id, 1);
+        assert_true(target.ambiguous);
+        double odds = exp(0.5 * (1.78 * 1.78 - 1.75 * 1.75) / 0.2625);
+        bst_assert_close(target.probability, odds / (1.0 + odds), 1e-6);
+        assert_int_equal(target.rival_id, 2);
+    }
+    target = (bst_target){0};
+    t[0] = make_track(1, 10, 0.0, 13);
+    t[1] = make_track(2, 10, 0.0, 13);
+    bst_target_step(&target, &params, &cue, 0.0, t, 2);
+    t[0].chi2 = 80; /* a merged detection that was no centre of light */
+    bst_target_step(&target, &params, &cue, 1.0, t, 2);
+    assert_int_equal(target.id, 1);
+    bst_assert_close(target.probability, 0.5, 1e-12);
+    bst_mtt_track wrong[2] = {make_track(1, 10, 1.7, 13), t[1]}; /* but it can be refuted */
+    wrong[0].chi2 = 80;
+    bst_target other = target;
+    bst_target_step(&other, &params, &cue, 2.0, wrong, 2);
+    assert_int_equal(other.id, 2);
+    t[0].state.covariance[2][2] = AS * AS; /* nor a rate that is not known */
+    bst_target_step(&target, &params, &cue, 2.0, t, 2);
+    assert_int_equal(target.id, 1);
+    bst_assert_close(target.probability, 0.5, 1e-12);
+    assert_true(target.ambiguous);
+}
+
 /* Two objects that pass each other swap their tracks while they share detections: the cue's rate
  * shows it, unless the target had left it by a manoeuvre. */
 static void swapped_tracks_are_noticed(void **state) {
@@ -470,6 +508,7 @@ int main(void) {
                                        cmocka_unit_test(holds_what_manoeuvres),
                                        cmocka_unit_test(ambiguity_is_resolved_by_time),
                                        cmocka_unit_test(swapped_tracks_are_noticed),
+                                       cmocka_unit_test(limits_do_not_make_certain),
                                        cmocka_unit_test(probabilities_are_calibrated),
                                        cmocka_unit_test(queries_of_a_frame)};
     return cmocka_run_group_tests(tests, NULL, NULL);
