@@ -178,8 +178,10 @@ static cJSON *scenario_json(drawing *d, cJSON *camera) {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddNumberToObject(root, "boresight", 1);
     cJSON_AddStringToObject(root, "name", "challenge");
-    snprintf(text, sizeof text, "2022-%02d-%02dT%02d:00:00Z", 1 + (int)uniform(d, 0, 11.99),
-             1 + (int)uniform(d, 0, 27.99), (int)uniform(d, 0, 23.99));
+    /* drawn one after another: compilers differ in the order of a call's arguments */
+    int hour = (int)uniform(d, 0, 23.99), day = 1 + (int)uniform(d, 0, 27.99);
+    int month = 1 + (int)uniform(d, 0, 11.99);
+    snprintf(text, sizeof text, "2022-%02d-%02dT%02d:00:00Z", month, day, hour);
     cJSON_AddStringToObject(root, "epoch_utc", text);
     cJSON_AddNumberToObject(
         root, "duration_s",
