@@ -1,7 +1,6 @@
 #include "sim/run/run_custody.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,6 +8,7 @@
 #include "sim/eval/consistency.h"
 #include "sim/run/run_arcs.h"
 #include "sim/run/run_candidates.h"
+#include "sim/run/run_custody_tables.h"
 #include "sim/run/run_new_objects.h"
 #include "tracker/orbit/custody.h"
 
@@ -56,48 +56,6 @@ struct bst_run_custody {
     bst_io_table *tracks, *objects;
     bst_custody_figures figures;
 };
-
-#define INT(name, unit, doc) \
-    { name, BST_COLUMN_INT, unit, doc }
-#define REAL(name, unit, doc) \
-    { name, BST_COLUMN_REAL, unit, doc }
-
-static const bst_io_column track_columns[] = {
-    INT("sensor", "", "row of the table sensors"),
-    INT("track_id", "", "of the sensor's tracker"),
-    REAL("time_s", "s", "middle of the last exposure with a detection, since the epoch"),
-    INT("hits", "", "detections of the track"),
-    INT("candidates", "", "objects whose predicted direction and rate agree"),
-    INT("object", "", "object that the track updated: id in truth; NULL: none, or a new one"),
-    INT("new_object", "", "new object that the track updated: 1, 2, ...; NULL: none"),
-    INT("true_object", "", "object that the track belongs to; NULL: none"),
-    REAL("chi2", "", "of the nearest candidate, 4 degrees of freedom; NULL: none"),
-    REAL("nees", "", "error of the updated elements squared, by their covariance, 6 degrees"),
-};
-
-static const bst_io_column object_columns[] = {
-    INT("object", "", "index in the scenario: id in truth; NULL: new object"),
-    {"name", BST_COLUMN_TEXT, "", "name of the object; new 1, new 2, ..."},
-    INT("norad", "", "catalogue number, 0: none"),
-    INT("updates", "", "tracks that updated its orbit"),
-    INT("cross_tags", "", "of these, tracks of another object, or of none"),
-    REAL("last_s", "s", "last update; NULL: none"),
-    REAL("age_s", "s", "time from the last update to the end"),
-    REAL("sigma_m", "m", "standard deviation of the position at the end"),
-    REAL("error_m", "m", "error of the position at the end"),
-    REAL("nees", "", "error of the elements squared, by their covariance, 6 degrees of freedom"),
-    REAL("chi2_mean", "", "mean of the tracks' chi-square, 4 degrees of freedom each"),
-    INT("true_object", "", "id in truth; NULL: new object of different ones, or of none"),
-};
-
-static bst_io_value whole_number(int64_t value, bool known) {
-    return (bst_io_value){.type = BST_COLUMN_INT, .is_null = !known, .as.integer = value};
-}
-
-static bst_io_value number(double value) {
-    bool known = isfinite(value);
-    return (bst_io_value){.type = BST_COLUMN_REAL, .is_null = !known, .as.real = value};
-}
 
 /* ---- making it ---- */
 
@@ -162,16 +120,6 @@ static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, const bst_scen
                           "false");
 }
 
-static bst_status make_tables(bst_ctx *ctx, bst_run_custody *c, bst_run *store) {
-    BST_TRY(bst_io_table_create(ctx, store, "custody_tracks",
-                                "Tracks that were correlated with the catalogue, as they ended.",
-                                track_columns, sizeof track_columns / sizeof *track_columns,
-                                &c->tracks));
-    return bst_io_table_create(ctx, store, "custody", "Orbits of the catalogue at the end.",
-                               object_columns, sizeof object_columns / sizeof *object_columns,
-                               &c->objects);
-}
-
 bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
                                   const bst_scenario *scenario, bst_run *store,
                                   bst_run_custody **out) {
@@ -207,7 +155,9 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
                  : status;
     status =
         status == BST_OK ? bst_run_candidates_create(ctx, world, store, &c->candidates) : status;
-    status = status == BST_OK && store ? make_tables(ctx, c, store) : status;
+    status = status == BST_OK && store
+                 ? bst_run_custody_tables_create(ctx, store, &c->tracks, &c->objects)
+                 : status;
     if (status != BST_OK) {
         bst_run_custody_free(c);
         return status;
@@ -499,16 +449,16 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     if (!c->tracks) {
         return BST_OK;
     }
-    const bst_io_value row[] = {whole_number(sensor, true),
-                                whole_number(arc->id, true),
-                                number(z->observer.time_s),
-                                whole_number(arc->hits, true),
-                                whole_number(m.count, true),
-                                whole_number(m.best, updated && new_one < 0),
-                                whole_number(new_one + 1, updated && new_one >= 0),
-                                whole_number(m.true_object, m.true_object >= 0),
-                                number(m.chi2),
-                                number(nees)};
+    const bst_io_value row[] = {bst_custody_whole_number(sensor, true),
+                                bst_custody_whole_number(arc->id, true),
+                                bst_custody_number(z->observer.time_s),
+                                bst_custody_whole_number(arc->hits, true),
+                                bst_custody_whole_number(m.count, true),
+                                bst_custody_whole_number(m.best, updated && new_one < 0),
+                                bst_custody_whole_number(new_one + 1, updated && new_one >= 0),
+                                bst_custody_whole_number(m.true_object, m.true_object >= 0),
+                                bst_custody_number(m.chi2),
+                                bst_custody_number(nees)};
     return bst_io_table_append(ctx, c->tracks, row);
 }
 
@@ -523,17 +473,6 @@ bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *c, int sensor,
 }
 
 /* ---- end ---- */
-
-static int compare(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Value at a share of a sorted list; NAN: empty. */
-static double quantile(double *values, int count, double share) {
-    qsort(values, (size_t)count, sizeof *values, compare);
-    return count > 0 ? values[(int)(share * (count - 1))] : NAN;
-}
 
 /* Writes the row of an object and adds it to the figures. */
 static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, double end_s,
@@ -553,72 +492,20 @@ static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, doubl
     if (!c->objects) {
         return BST_OK;
     }
-    const bst_io_value row[] = {whole_number(object, true),
-                                {.type = BST_COLUMN_TEXT, .as.text = info->name},
-                                whole_number(info->norad, true),
-                                whole_number(s->updates, true),
-                                whole_number(s->cross_tags, true),
-                                number(s->last_s),
-                                number(end_s - s->last_s),
-                                number(*sigma_m),
-                                number(error_m),
-                                number(*nees),
-                                number(s->updates > 0 ? s->chi2_sum / (double)s->updates : NAN),
-                                whole_number(object, true)};
+    const bst_io_value row[] = {
+        bst_custody_whole_number(object, true),
+        {.type = BST_COLUMN_TEXT, .as.text = info->name},
+        bst_custody_whole_number(info->norad, true),
+        bst_custody_whole_number(s->updates, true),
+        bst_custody_whole_number(s->cross_tags, true),
+        bst_custody_number(s->last_s),
+        bst_custody_number(end_s - s->last_s),
+        bst_custody_number(*sigma_m),
+        bst_custody_number(error_m),
+        bst_custody_number(*nees),
+        bst_custody_number(s->updates > 0 ? s->chi2_sum / (double)s->updates : NAN),
+        bst_custody_whole_number(object, true)};
     return bst_io_table_append(ctx, c->objects, row);
-}
-
-/* Whether a new object is none: of tracks of different objects, catalogued, or a second one. */
-static bool is_wrong(const bst_run_custody *c, int index) {
-    const int64_t object = c->new_objects.items[index].true_object;
-    bool wrong = object < 0 || c->orbits[object].a_m > 0.0;
-    for (int i = 0; i < index && !wrong; i++) {
-        wrong = c->new_objects.items[i].true_object == object;
-    }
-    return wrong;
-}
-
-/* Writes the rows of the new objects and their figures. */
-static bst_status end_new_objects(bst_ctx *ctx, bst_run_custody *c, double end_s) {
-    bst_custody_figures *f = &c->figures;
-    const int count = c->new_objects.count;
-    double *sigmas = calloc((size_t)count + 1, sizeof *sigmas), nees_sum = 0.0;
-    int known = 0, nees_count = 0;
-    bst_status status =
-        sigmas ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", count);
-    f->new_objects = count;
-    f->new_wrong = 0;
-    for (int i = 0; i < count && status == BST_OK; i++) {
-        bst_run_new_object *o = &c->new_objects.items[i];
-        double sigma, error, nees;
-        char name[32];
-        bst_run_new_object_score(o, c->world, end_s, &sigma, &error, &nees);
-        f->new_wrong += is_wrong(c, i);
-        nees_sum += isnan(nees) ? 0.0 : nees;
-        nees_count += !isnan(nees);
-        if (!isnan(sigma)) {
-            sigmas[known++] = sigma;
-        }
-        (void)snprintf(name, sizeof name, "new %d", i + 1);
-        const bst_io_value row[] = {
-            whole_number(0, false),
-            {.type = BST_COLUMN_TEXT, .as.text = name},
-            whole_number(0, true),
-            whole_number(o->updates, true),
-            whole_number(o->cross_tags, true),
-            number(o->last_s),
-            number(end_s - o->last_s),
-            number(sigma),
-            number(error),
-            number(nees),
-            number(o->chi2_count > 0 ? o->chi2_sum / (double)o->chi2_count : NAN),
-            whole_number(o->true_object, o->true_object >= 0)};
-        status = c->objects ? bst_io_table_append(ctx, c->objects, row) : BST_OK;
-    }
-    f->new_sigma_median_m = sigmas ? quantile(sigmas, known, 0.5) : NAN;
-    f->new_nees_mean = nees_count > 0 ? nees_sum / nees_count : NAN;
-    free(sigmas);
-    return status;
 }
 
 bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s) {
@@ -654,12 +541,22 @@ bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s
             nees_count += !isnan(nees);
         }
     }
-    BST_TRY(end_new_objects(ctx, c, end_s));
+    bst_run_new_figures new_ones;
+    BST_TRY(
+        bst_run_new_objects_finish(ctx, &c->new_objects, c->world, c->objects, end_s, &new_ones));
+    f->new_objects = c->new_objects.count;
+    f->new_wrong = new_ones.wrong;
+    f->new_sigma_median_m = new_ones.sigma_median_m;
+    f->new_nees_mean = new_ones.nees_mean;
+    for (int i = 0; i < c->new_objects.count; i++) {
+        const int64_t object = c->new_objects.items[i].true_object;
+        f->new_wrong += object >= 0 && c->orbits[object].a_m > 0.0; /* it was catalogued */
+    }
     f->objects = count;
     f->age_mean_s = updated_count > 0 ? age_sum / updated_count : NAN;
-    f->sigma_median_m = quantile(sigmas, count, 0.5);
-    f->sigma_p90_m = quantile(sigmas, count, 0.9);
-    f->sigma_updated_median_m = quantile(updated, updated_count, 0.5);
+    f->sigma_median_m = bst_custody_quantile(sigmas, count, 0.5);
+    f->sigma_p90_m = bst_custody_quantile(sigmas, count, 0.9);
+    f->sigma_updated_median_m = bst_custody_quantile(updated, updated_count, 0.5);
     f->nees_mean = nees_count > 0 ? nees_sum / nees_count : NAN;
     double dof = (double)BST_CUSTODY_STATE * nees_count;
     f->nees_low = nees_count > 0 ? bst_eval_chi2_quantile(0.025, dof) / nees_count : NAN;

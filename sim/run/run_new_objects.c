@@ -1,8 +1,11 @@
 #include "sim/run/run_new_objects.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "sim/run/run_custody_tables.h"
 
 enum { MOST_OBJECTS = 1 << 16 };
 /* Chi-square of 6 degrees of freedom that errors as stated exceed with probability 2e-5, times 9
@@ -48,24 +51,19 @@ void bst_run_new_object_advance(bst_run_new_object *o, double time_s) {
     bst_custody_add_process_noise(&config, time_s, &o->filter);
 }
 
-/* Standard deviation of a position from the covariance of elements. */
-static double sigma_of(const bst_custody_filter *f) {
-    double sum = 0.0;
-    for (int k = BST_CUSTODY_ECC_X; k < BST_CUSTODY_STATE; k++) {
-        sum += f->p[k][k];
-    }
-    return sqrt(sum);
-}
-
 bool bst_run_new_object_is(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                            const bst_custody_orbit *other, const bst_custody_filter *other_filter,
                            double time_s, double *chi2) {
     bst_vec3 r, v, place, unused;
     bst_custody_filter own, theirs;
+    double sigma_m[2];
     *chi2 = NAN;
     if (!bst_custody_state(orbit, filter->x, time_s, &r, &v) ||
         !bst_custody_state(other, other_filter->x, time_s, &place, &unused) ||
         !(bst_vec3_norm(bst_vec3_sub(place, r)) < REACH_M) ||
+        !bst_custody_predict_position(orbit, filter, time_s, &unused, &sigma_m[0]) ||
+        !bst_custody_predict_position(other, other_filter, time_s, &unused, &sigma_m[1]) ||
+        !(hypot(sigma_m[0], sigma_m[1]) < MOST_SIGMA_M) ||
         !bst_custody_difference(orbit, filter, time_s, r, v, &own) ||
         !bst_custody_difference(other, other_filter, time_s, r, v, &theirs)) {
         return false;
@@ -77,7 +75,7 @@ bool bst_run_new_object_is(const bst_custody_orbit *orbit, const bst_custody_fil
         }
     }
     *chi2 = bst_custody_nees(&theirs);
-    return *chi2 < MOST_CHI2 && sigma_of(&theirs) < MOST_SIGMA_M;
+    return *chi2 < MOST_CHI2;
 }
 
 bool bst_run_new_object_carry(const bst_custody_orbit *from, const bst_custody_filter *filter,
@@ -101,8 +99,10 @@ bool bst_run_new_object_carry(const bst_custody_orbit *from, const bst_custody_f
     return true;
 }
 
-void bst_run_new_object_score(bst_run_new_object *o, const bst_world *world, double time_s,
-                              double *sigma_m, double *error_m, double *nees) {
+/* Position at `time_s` against the truth: standard deviation, error, and NEES of the osculating
+ * elements; NAN where there is none. */
+static void score_object(bst_run_new_object *o, const bst_world *world, double time_s,
+                         double *sigma_m, double *error_m, double *nees) {
     const double none[BST_CUSTODY_STATE] = {0.0};
     double offset_s;
     bst_ctx quiet = {0};
@@ -123,6 +123,57 @@ void bst_run_new_object_score(bst_run_new_object *o, const bst_world *world, dou
             *nees = bst_custody_nees(&difference);
         }
     }
+}
+
+/* Whether a new object is of tracks of different objects or of none, or a second one of its object.
+ */
+static bool is_wrong(const bst_run_new_objects *n, int index) {
+    const int64_t object = n->items[index].true_object;
+    bool wrong = object < 0;
+    for (int i = 0; i < index && !wrong; i++) {
+        wrong = n->items[i].true_object == object;
+    }
+    return wrong;
+}
+
+bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *n, const bst_world *world,
+                                      bst_io_table *table, double end_s, bst_run_new_figures *out) {
+    double *sigmas = calloc((size_t)n->count + 1, sizeof *sigmas), nees_sum = 0.0;
+    int known = 0, nees_count = 0;
+    bst_status status =
+        sigmas ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", n->count);
+    *out = (bst_run_new_figures){.wrong = 0};
+    for (int i = 0; i < n->count && status == BST_OK; i++) {
+        bst_run_new_object *o = &n->items[i];
+        double sigma, error, nees;
+        char name[32];
+        score_object(o, world, end_s, &sigma, &error, &nees);
+        out->wrong += is_wrong(n, i);
+        nees_sum += isnan(nees) ? 0.0 : nees;
+        nees_count += !isnan(nees);
+        if (!isnan(sigma)) {
+            sigmas[known++] = sigma;
+        }
+        (void)snprintf(name, sizeof name, "new %d", i + 1);
+        const bst_io_value row[] = {
+            bst_custody_whole_number(0, false),
+            {.type = BST_COLUMN_TEXT, .as.text = name},
+            bst_custody_whole_number(0, true),
+            bst_custody_whole_number(o->updates, true),
+            bst_custody_whole_number(o->cross_tags, true),
+            bst_custody_number(o->last_s),
+            bst_custody_number(end_s - o->last_s),
+            bst_custody_number(sigma),
+            bst_custody_number(error),
+            bst_custody_number(nees),
+            bst_custody_number(o->chi2_count > 0 ? o->chi2_sum / (double)o->chi2_count : NAN),
+            bst_custody_whole_number(o->true_object, o->true_object >= 0)};
+        status = table ? bst_io_table_append(ctx, table, row) : BST_OK;
+    }
+    out->sigma_median_m = sigmas ? bst_custody_quantile(sigmas, known, 0.5) : NAN;
+    out->nees_mean = nees_count > 0 ? nees_sum / nees_count : NAN;
+    free(sigmas);
+    return status;
 }
 
 bst_status bst_run_new_objects_archive(bst_run_new_objects *n, int world_objects,

@@ -3,6 +3,7 @@
 #define BST_RUN_RUN_NEW_OBJECTS_H
 
 #include "boresight/archive.h"
+#include "sim/io/run_store.h"
 #include "sim/world/world.h"
 #include "tracker/orbit/custody.h"
 
@@ -24,6 +25,13 @@ typedef struct bst_run_new_objects {
     bst_run_new_object *items;
 } bst_run_new_objects;
 
+/* Score of the new objects at the end of a run. */
+typedef struct bst_run_new_figures {
+    int64_t wrong;         /* of tracks of different objects or of none, or a second one */
+    double sigma_median_m; /* of the position; NAN: none */
+    double nees_mean;      /* of their osculating elements, 6 degrees of freedom; NAN: none */
+} bst_run_new_figures;
+
 /* Appends an object, and gives it its id and process noise. Errors: BST_ERR_MEMORY */
 bst_status bst_run_new_objects_add(bst_ctx *ctx, bst_run_new_objects *objects,
                                    const bst_run_new_object *object) BST_MUST_CHECK;
@@ -34,8 +42,8 @@ void bst_run_new_object_advance(bst_run_new_object *object, double time_s);
 
 /* Whether two orbits with filters are those of one object at `time_s`: the squared difference of
  * their elements by the sum of both covariances is that of errors up to three times as large as
- * stated, and the standard deviation of the difference is at most 5 km, as otherwise neighbours
- * would be one.
+ * stated, and the standard deviation of the difference of places is at most 5 km, as otherwise
+ * neighbours would be one.
  *
  * Returned:  *chi2  of the difference, 6 degrees of freedom; NAN: none */
 bool bst_run_new_object_is(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
@@ -48,10 +56,11 @@ bool bst_run_new_object_is(const bst_custody_orbit *orbit, const bst_custody_fil
 bool bst_run_new_object_carry(const bst_custody_orbit *from, const bst_custody_filter *filter,
                               const bst_custody_orbit *to, double time_s, bst_custody_filter *out);
 
-/* Position at `time_s` against the truth: standard deviation, error, and NEES of the osculating
- * elements, m; NAN where there is none. */
-void bst_run_new_object_score(bst_run_new_object *object, const bst_world *world, double time_s,
-                              double *sigma_m, double *error_m, double *nees);
+/* Scores the new objects against the truth at the end, and writes their rows to the table custody
+ * (NULL: no rows). Errors: BST_ERR_MEMORY, those of bst_io_table_append */
+bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *objects,
+                                      const bst_world *world, bst_io_table *table, double end_s,
+                                      bst_run_new_figures *out) BST_MUST_CHECK;
 
 /* Saves or restores the objects. Errors: BST_ERR_MEMORY; BST_ERR_FORMAT: their number, or an object
  * of the truth that the world lacks */

@@ -20,9 +20,10 @@ bool __wrap_bst_custody_update(const bst_custody_orbit *orbit, const bst_custody
     return !updates_fail && __real_bst_custody_update(orbit, z, filter);
 }
 
-/* What observations of object 44802 are predicted to be, in place of a prediction; and the
- * photocentres of all objects. */
+/* What observations of an object, by its number, are predicted to be, in place of a prediction; and
+ * the photocentres of all objects. */
 static const bst_custody_prediction *predicted;
+static int lost_norad = 44802;
 static double photocentres_m[8];
 static int photocentre_count;
 
@@ -30,7 +31,7 @@ bool __real_bst_custody_predict(const bst_custody_orbit *orbit, const bst_custod
                                 const bst_custody_observation *z, bst_custody_prediction *out);
 bool __wrap_bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                                 const bst_custody_observation *z, bst_custody_prediction *out) {
-    if (predicted && orbit->elements.norad == 44802) {
+    if (predicted && orbit->elements.norad == lost_norad) {
         *out = *predicted;
         return true;
     }
@@ -213,13 +214,14 @@ static void tracks_update_their_objects(void **state) {
     cJSON *manifest = cJSON_CreateObject();
     bst_run_custody_add(c, manifest);
     const cJSON *node = cJSON_GetObjectItem(manifest, "custody");
-    const char *keys[] = {"objects",         "updated",     "in_custody",
-                          "tracks",          "correlated",  "ambiguous",
-                          "uncorrelated",    "cross_tags",  "age_mean_s",
-                          "sigma_median_m",  "sigma_p90_m", "sigma_updated_median_m",
-                          "nees_mean",       "nees_low",    "nees_high",
-                          "unknown",         "candidates",  "candidates_confirmed",
-                          "candidates_wrong"};
+    const char *keys[] = {"objects",          "updated",     "in_custody",
+                          "tracks",           "correlated",  "ambiguous",
+                          "uncorrelated",     "cross_tags",  "age_mean_s",
+                          "sigma_median_m",   "sigma_p90_m", "sigma_updated_median_m",
+                          "nees_mean",        "nees_low",    "nees_high",
+                          "unknown",          "candidates",  "candidates_confirmed",
+                          "candidates_wrong", "new_objects", "new_tracks",
+                          "new_wrong",        "new_matched"};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
         assert_true(cJSON_IsNumber(cJSON_GetObjectItem(node, keys[i])));
     }
@@ -560,6 +562,82 @@ static void unknown_objects_become_candidates(void **state) {
     bst_world_free(world);
 }
 
+/* A confirmed candidate with an orbit becomes an object: a later track updates it, it is in the
+ * table `custody` with the error against the truth, also after a saved state. */
+static void candidates_become_objects(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch place;
+    bst_run *store;
+    bst_run_reader *run;
+    bst_custody_figures f;
+    bst_world *world = world_of_two();
+    const int unknown[6] = {0, 0, 0, 0, 0, 0};
+    scratch_make(&place);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
+    bst_run_custody *before = without_a(&ctx, world, NULL), *c = without_a(&ctx, world, store);
+    for (int k = 0; k < 3; k++) {
+        take_detected(&ctx, before, world, unknown, k + 1, 100.0 + 6900.0 * k);
+    }
+    copy_state(&ctx, before, c);
+    take_detected(&ctx, c, world, unknown, 4, 20000.0);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 25000.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.new_objects == 1 && f.new_tracks == 1 && f.new_wrong == 0 && f.new_matched == 0);
+    assert_true(f.uncorrelated == 3 && f.correlated == 1 && f.cross_tags == 0);
+    assert_true(f.unknown == 1 && f.candidates == 1);
+    assert_true(f.new_sigma_median_m > 10.0 && f.new_sigma_median_m < 1000.0);
+    /* the directions have no errors here; consistency is shown in test_custody_start.c */
+    assert_true(f.new_nees_mean > 0.0 && f.new_nees_mean < 6.0);
+    bst_run_custody_free(before);
+    bst_run_custody_free(c);
+    bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_reader_open(&ctx, scratch_path(&place, "run"), &run));
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody WHERE name = 'new 1' AND "
+                                        "object IS NULL AND true_object = 0 AND updates = 4 AND "
+                                        "cross_tags = 0 AND error_m < 4 * sigma_m AND nees > 0",
+                                        0, 0),
+                     1);
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody_tracks WHERE new_object = 1 "
+                                        "AND object IS NULL AND true_object = 0",
+                                        0, 0),
+                     1);
+    bst_run_reader_close(run);
+    bst_world_free(world);
+    scratch_remove(&place);
+}
+
+/* A new object's orbit that is that of a catalogued object, whose filter had lost it, starts that
+ * filter anew. */
+static void new_objects_match_the_catalogue(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_custody *c;
+    bst_custody_figures f;
+    const int own[6] = {0, 0, 0, 0, 0, 0};
+    const bst_custody_prediction far = {.innovation = {1.0, 1.0}, .chi2 = 1e3};
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
+    predicted = &far;
+    lost_norad = 44801;
+    for (int k = 0; k < 3; k++) {
+        take_detected(&ctx, c, world, own, k + 1, 100.0 + 6900.0 * k);
+    }
+    predicted = NULL;
+    lost_norad = 44802;
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 25000.0));
+    assert_true(bst_run_custody_figures(c, &f));
+                  assert_true(f.uncorrelated == 3 && f.new_objects == 0 && f.new_matched == 1);
+                  assert_true(f.updated == 1 && f.cross_tags == 0);
+                  assert_true(f.nees_mean > 0.0 &&
+                              f.nees_mean < 6.0); /* directions without errors */
+                  bst_run_custody_free(c);
+                  bst_world_free(world);
+}
+
 static void off_and_without_objects(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -594,6 +672,8 @@ int main(void) {
         cmocka_unit_test(neighbours_by_their_uncertainty),
         cmocka_unit_test(directions_update_their_object),
         cmocka_unit_test(unknown_objects_become_candidates),
+        cmocka_unit_test(candidates_become_objects),
+        cmocka_unit_test(new_objects_match_the_catalogue),
         cmocka_unit_test(off_and_without_objects),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
