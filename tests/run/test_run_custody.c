@@ -630,12 +630,11 @@ static void new_objects_match_the_catalogue(void **state) {
     lost_norad = 44802;
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 25000.0));
     assert_true(bst_run_custody_figures(c, &f));
-                  assert_true(f.uncorrelated == 3 && f.new_objects == 0 && f.new_matched == 1);
-                  assert_true(f.updated == 1 && f.cross_tags == 0);
-                  assert_true(f.nees_mean > 0.0 &&
-                              f.nees_mean < 6.0); /* directions without errors */
-                  bst_run_custody_free(c);
-                  bst_world_free(world);
+    assert_true(f.uncorrelated == 3 && f.new_objects == 0 && f.new_matched == 1);
+    assert_true(f.updated == 1 && f.cross_tags == 0);
+    assert_true(f.nees_mean > 0.0 && f.nees_mean < 6.0); /* directions without errors */
+    bst_run_custody_free(c);
+    bst_world_free(world);
 }
 
 static void off_and_without_objects(void **state) {
