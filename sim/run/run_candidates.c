@@ -73,7 +73,7 @@ void bst_run_candidates_free(bst_run_candidates *c) {
 /* Rotates a state and its covariance from GCRF to TEME. TEME turns by 8e-12 rad/s: 28 m a day at a
  * geostationary distance. */
 static bst_status turn_to_teme(bst_ctx *ctx, bst_run_candidates *c, const bst_od_solution *s,
-                               bst_vec3 *r, bst_vec3 *v, double covariance[6][6]) {
+                               bst_custody_fix *out) {
     const double step_s = 1800.0;
     bst_sky_rotation now, sides[2];
     const bst_time t = bst_time_add(c->motion.epoch, s->state.time_s);
@@ -81,19 +81,22 @@ static bst_status turn_to_teme(bst_ctx *ctx, bst_run_candidates *c, const bst_od
     BST_TRY(bst_sky_clock_at(ctx, c->clock, bst_time_add(t, step_s), &sides[0]));
     BST_TRY(bst_sky_clock_at(ctx, c->clock, bst_time_add(t, -step_s), &sides[1]));
     const bst_mat3 *turn = &now.frames.gcrf_from_teme;
-    *r = bst_mat3_transpose_mul_vec(turn, s->state.position_m);
-    const bst_vec3 moved =
-        bst_vec3_scale(bst_vec3_sub(bst_mat3_mul_vec(&sides[0].frames.gcrf_from_teme, *r),
-                                    bst_mat3_mul_vec(&sides[1].frames.gcrf_from_teme, *r)),
-                       0.5 / step_s);
-    *v = bst_mat3_transpose_mul_vec(turn, bst_vec3_sub(s->state.velocity_mps, moved));
+    out->time_s = s->state.time_s;
+    bst_time_utc(t, &out->epoch_utc_jd[0], &out->epoch_utc_jd[1]);
+    out->position_m = bst_mat3_transpose_mul_vec(turn, s->state.position_m);
+    const bst_vec3 moved = bst_vec3_scale(
+        bst_vec3_sub(bst_mat3_mul_vec(&sides[0].frames.gcrf_from_teme, out->position_m),
+                     bst_mat3_mul_vec(&sides[1].frames.gcrf_from_teme, out->position_m)),
+        0.5 / step_s);
+    out->velocity_mps =
+        bst_mat3_transpose_mul_vec(turn, bst_vec3_sub(s->state.velocity_mps, moved));
     for (int i = 0; i < 6; i++) {
         for (int k = 0; k < 6; k++) {
-            covariance[i][k] = 0.0;
+            out->covariance[i][k] = 0.0;
             for (int m = 0; m < 9; m++) {
-                covariance[i][k] += turn->m[m / 3][i % 3] *
-                                    s->covariance[m / 3 + i / 3 * 3][m % 3 + k / 3 * 3] *
-                                    turn->m[m % 3][k % 3];
+                out->covariance[i][k] += turn->m[m / 3][i % 3] *
+                                         s->covariance[m / 3 + i / 3 * 3][m % 3 + k / 3 * 3] *
+                                         turn->m[m % 3][k % 3];
             }
         }
     }
@@ -113,12 +116,9 @@ static bst_status confirm(bst_ctx *ctx, bst_run_candidates *c, int at, double la
         !(found.bend < 1.0)) {
         return BST_OK;
     }
-    double jd[2], covariance[6][6];
-    bst_vec3 r, v;
-    BST_TRY(turn_to_teme(ctx, c, &found, &r, &v, covariance));
-    bst_time_utc(bst_time_add(c->motion.epoch, found.state.time_s), &jd[0], &jd[1]);
-    if (!bst_custody_start(found.state.time_s, jd, r, v, covariance, UNKNOWN_PHOTOCENTRE_M,
-                           &made->orbit, &made->filter)) {
+    bst_custody_fix fix;
+    BST_TRY(turn_to_teme(ctx, c, &found, &fix));
+    if (!bst_custody_start(&fix, UNKNOWN_PHOTOCENTRE_M, &made->orbit, &made->filter)) {
         return BST_OK;
     }
     made->updates = item->arcs;

@@ -35,6 +35,7 @@ typedef struct bst_run_new_figures {
 /* Appends an object, and gives it its id and process noise. Errors: BST_ERR_MEMORY */
 bst_status bst_run_new_objects_add(bst_ctx *ctx, bst_run_new_objects *objects,
                                    const bst_run_new_object *object) BST_MUST_CHECK;
+/* Frees the objects; none are left. */
 void bst_run_new_objects_clear(bst_run_new_objects *objects);
 
 /* Adds an object's process noise until `time_s`. */

@@ -58,10 +58,13 @@ static void errors_agree_with_covariances(void **state) {
                 e[k] += root[k][m] * bst_rng_normal(key, (uint64_t)i, (uint64_t)m);
             }
         }
-        const double epoch[2] = {set.epoch_utc_jd1, set.epoch_utc_jd2 + at_s / BST_DAY_S};
-        if (!bst_custody_start(at_s, epoch, bst_vec3_add(r, (bst_vec3){e[0], e[1], e[2]}),
-                               bst_vec3_add(v, (bst_vec3){e[3], e[4], e[5]}), covariance, 0.5,
-                               &orbit, &filter) ||
+        bst_custody_fix fix = {
+            .time_s = at_s,
+            .epoch_utc_jd = {set.epoch_utc_jd1, set.epoch_utc_jd2 + at_s / BST_DAY_S},
+            .position_m = bst_vec3_add(r, (bst_vec3){e[0], e[1], e[2]}),
+            .velocity_mps = bst_vec3_add(v, (bst_vec3){e[3], e[4], e[5]})};
+        memcpy(fix.covariance, covariance, sizeof covariance);
+        if (!bst_custody_start(&fix, 0.5, &orbit, &filter) ||
             !bst_custody_difference(&orbit, &filter, at_s, r, v, &d[0]) ||
             !bst_custody_difference(&orbit, &filter, later_s, r_later, v_later, &d[1])) {
             continue;
@@ -104,15 +107,17 @@ static void drag_is_noise(void **state) {
 
 static void no_orbit(void **state) {
     (void)state;
-    double root[6][6], covariance[6][6];
-    const double zero[6][6] = {{0.0}}, epoch[2] = {2459746.5, 0.0};
-    const bst_vec3 r = {7e6, 0.0, 0.0}, v = {0.0, 5400.0, 5400.0}, fast = {0.0, 9000.0, 9000.0};
+    double root[6][6];
+    bst_custody_fix fix = {.epoch_utc_jd = {2459746.5, 0.0},
+                           .position_m = {7e6, 0.0, 0.0},
+                           .velocity_mps = {0.0, 5400.0, 5400.0}};
     bst_custody_orbit orbit;
     bst_custody_filter filter;
-    make_covariance(root, covariance);
-    assert_true(bst_custody_start(0.0, epoch, r, v, covariance, 0.5, &orbit, &filter));
-    assert_false(bst_custody_start(0.0, epoch, r, fast, covariance, 0.5, &orbit, &filter));
-    assert_false(bst_custody_start(0.0, epoch, r, v, zero, 0.5, &orbit, &filter));
+    assert_false(bst_custody_start(&fix, 0.5, &orbit, &filter)); /* no covariance */
+    make_covariance(root, fix.covariance);
+    assert_true(bst_custody_start(&fix, 0.5, &orbit, &filter));
+    fix.velocity_mps = (bst_vec3){0.0, 9000.0, 9000.0};
+    assert_false(bst_custody_start(&fix, 0.5, &orbit, &filter));
 }
 
 int main(void) {

@@ -138,20 +138,25 @@ bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_cust
  * degrees of freedom. NAN: the covariance is singular. */
 double bst_custody_nees(const bst_custody_filter *filter);
 
-/* Orbit and filter of a new object from a state with its covariance.
+/* A state with its covariance: TEME, m and m/s, order r, v. */
+typedef struct bst_custody_fix {
+    double time_s;          /* since the epoch of the run */
+    double epoch_utc_jd[2]; /* the same as a Julian date in two parts */
+    bst_vec3 position_m, velocity_mps;
+    double covariance[6][6];
+} bst_custody_fix;
+
+/* Orbit and filter of a new object.
  *
- * Given:     time_s              of the state; the epoch of the elements
- *            epoch_utc_jd        the same as a Julian date in two parts
- *            position, velocity  TEME, m and m/s; the velocity is the derivative of positions
- *            covariance          of r, v in these axes
- *            photocentre_m       as in bst_custody_orbit
+ * Given:     fix            at what becomes the epoch of the elements; its velocity is the
+ *                           derivative of positions
+ *            photocentre_m  as in bst_custody_orbit
  * Returned:  elements without drag (B* 0), and a filter about them; false: no SGP4 orbit there, or
  *            the covariance is singular
  * Notes:     the covariance is carried to the elements by central differences of one standard
  *            deviation along the columns of its root; near the equator to osculating ones. */
-bool bst_custody_start(double time_s, const double epoch_utc_jd[2], bst_vec3 position_teme_m,
-                       bst_vec3 velocity_teme_mps, const double covariance[6][6],
-                       double photocentre_m, bst_custody_orbit *orbit, bst_custody_filter *filter);
+bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_custody_orbit *orbit,
+                       bst_custody_filter *filter);
 
 /* Standard deviation of the drift that an object gains in a day as a random walk, so that its place
  * a day after the epoch of its elements is as uncertain as by an unknown B* of 3e-4 per Earth

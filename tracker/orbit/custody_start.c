@@ -121,16 +121,17 @@ static bool numbers_through(bst_vec3 r, bst_vec3 v, bool osculating, bst_element
     return true;
 }
 
-bool bst_custody_start(double time_s, const double epoch_utc_jd[2], bst_vec3 r, bst_vec3 v,
-                       const double covariance[6][6], double photocentre_m,
-                       bst_custody_orbit *orbit, bst_custody_filter *filter) {
-    assert(epoch_utc_jd && covariance && orbit && filter);
+bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_custody_orbit *orbit,
+                       bst_custody_filter *filter) {
+    assert(fix && orbit && filter);
+    const bst_vec3 r = fix->position_m, v = fix->velocity_mps;
     double root[N][N], unused[N];
     bst_ctx quiet = {0};
-    bst_elements elements = {.epoch_utc_jd1 = epoch_utc_jd[0], .epoch_utc_jd2 = epoch_utc_jd[1]};
+    bst_elements elements = {.epoch_utc_jd1 = fix->epoch_utc_jd[0],
+                             .epoch_utc_jd2 = fix->epoch_utc_jd[1]};
     memset(filter, 0, sizeof *filter);
-    if (!root_of(covariance, root) || !numbers_through(r, v, false, &elements, unused) ||
-        bst_custody_orbit_init(&quiet, &elements, -time_s, photocentre_m, orbit) != BST_OK) {
+    if (!root_of(fix->covariance, root) || !numbers_through(r, v, false, &elements, unused) ||
+        bst_custody_orbit_init(&quiet, &elements, -fix->time_s, photocentre_m, orbit) != BST_OK) {
         return false;
     }
     const bool flat = elements.inclination_rad < BST_CUSTODY_LEAST_INCLINATION_RAD;
@@ -147,14 +148,14 @@ bool bst_custody_start(double time_s, const double epoch_utc_jd[2], bst_vec3 r, 
             }
         }
         distances(orbit->a_m, side[0], side[1], column);
-        column[BST_CUSTODY_ALONG] -= column[BST_CUSTODY_DRIFT] * time_s / BST_DAY_S;
+        column[BST_CUSTODY_ALONG] -= column[BST_CUSTODY_DRIFT] * fix->time_s / BST_DAY_S;
         for (int i = 0; i < N; i++) {
             for (int j = 0; j < N; j++) {
                 filter->p[i][j] += 0.25 * column[i] * column[j];
             }
         }
     }
-    filter->noise_until_s = time_s;
+    filter->noise_until_s = fix->time_s;
     return true;
 }
 
