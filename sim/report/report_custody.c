@@ -29,6 +29,12 @@ static void put_cards(FILE *out, const cJSON *f) {
     bst_report_page_card(out, text, "", "tracks correlated", note);
     snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "cross_tags"));
     bst_report_page_card(out, text, "", "cross-tags", "tracks of another object by the truth");
+    if (bst_json_member_number(f, "candidates") > 0.0) {
+        snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "new_objects"));
+        snprintf(note, sizeof note, "of %.0f candidates; %.0f wrong by the truth",
+                 bst_json_member_number(f, "candidates"), bst_json_member_number(f, "new_wrong"));
+        bst_report_page_card(out, text, "", "new objects", note);
+    }
     snprintf(note, sizeof note, "all objects: %s m, 90 %% below %s m",
              bst_report_page_number(more, bst_json_member_number(f, "sigma_median_m"), 3),
              bst_report_page_number(least, bst_json_member_number(f, "sigma_p90_m"), 3));

@@ -2,13 +2,18 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sim/astro/sky_clock.h"
 #include "sim/world/world_config.h"
 #include "tracker/orbit/orbit_link.h"
 
 /* Tracks are linked within a day. */
-static const double WITHIN_S = 86400.0;
+static const double WITHIN_S = BST_DAY_S;
+/* tracks that confirm a candidate: two that do not belong together fit an orbit more easily */
+enum { CONFIRMED = 3 };
+/* half the radius of a sphere of 1 m^2 per quarter of its cross-section, as in run_custody.c, m */
+static const double UNKNOWN_PHOTOCENTRE_M = 0.5;
 
 struct bst_run_candidates {
     bst_sky_clock *clock;
@@ -65,8 +70,71 @@ void bst_run_candidates_free(bst_run_candidates *c) {
     }
 }
 
+/* Rotates a state and its covariance from GCRF to TEME. TEME turns by 8e-12 rad/s: 28 m a day at a
+ * geostationary distance. */
+static bst_status turn_to_teme(bst_ctx *ctx, bst_run_candidates *c, const bst_od_solution *s,
+                               bst_custody_fix *out) {
+    const double step_s = 1800.0;
+    bst_sky_rotation now, sides[2];
+    const bst_time t = bst_time_add(c->motion.epoch, s->state.time_s);
+    BST_TRY(bst_sky_clock_at(ctx, c->clock, t, &now));
+    BST_TRY(bst_sky_clock_at(ctx, c->clock, bst_time_add(t, step_s), &sides[0]));
+    BST_TRY(bst_sky_clock_at(ctx, c->clock, bst_time_add(t, -step_s), &sides[1]));
+    const bst_mat3 *turn = &now.frames.gcrf_from_teme;
+    out->time_s = s->state.time_s;
+    bst_time_utc(t, &out->epoch_utc_jd[0], &out->epoch_utc_jd[1]);
+    out->position_m = bst_mat3_transpose_mul_vec(turn, s->state.position_m);
+    const bst_vec3 moved = bst_vec3_scale(
+        bst_vec3_sub(bst_mat3_mul_vec(&sides[0].frames.gcrf_from_teme, out->position_m),
+                     bst_mat3_mul_vec(&sides[1].frames.gcrf_from_teme, out->position_m)),
+        0.5 / step_s);
+    out->velocity_mps =
+        bst_mat3_transpose_mul_vec(turn, bst_vec3_sub(s->state.velocity_mps, moved));
+    for (int i = 0; i < 6; i++) {
+        for (int k = 0; k < 6; k++) {
+            out->covariance[i][k] = 0.0;
+            for (int m = 0; m < 9; m++) {
+                out->covariance[i][k] += turn->m[m / 3][i % 3] *
+                                         s->covariance[m / 3 + i / 3 * 3][m % 3 + k / 3 * 3] *
+                                         turn->m[m % 3][k % 3];
+            }
+        }
+    }
+    return BST_OK;
+}
+
+/* Makes a new object of a candidate whose tracks determine an orbit, and removes the candidate. */
+static bst_status confirm(bst_ctx *ctx, bst_run_candidates *c, int at, double last_s,
+                          bst_run_new_object *made) {
+    const bst_od_linked *item = &c->linker.items[at];
+    const bst_od_options options = {.motion = c->motion, .scale_variance = true};
+    bst_od_solution found;
+    bst_ctx quiet = {0}; /* the candidate waits for another track */
+    if (item->arcs < CONFIRMED ||
+        bst_od_fit(&quiet, item->directions, item->count, &options, &item->state, NULL, &found) !=
+            BST_OK ||
+        !(found.bend < 1.0)) {
+        return BST_OK;
+    }
+    bst_custody_fix fix;
+    BST_TRY(turn_to_teme(ctx, c, &found, &fix));
+    if (!bst_custody_start(&fix, UNKNOWN_PHOTOCENTRE_M, &made->orbit, &made->filter)) {
+        return BST_OK;
+    }
+    made->updates = item->arcs;
+    made->last_s = last_s;
+    made->true_object = c->mixed[at] ? -1 : c->object[at];
+    const int last = c->linker.count - 1;
+    bst_od_linker_drop(&c->linker, at);
+    c->object[at] = c->object[last];
+    c->mixed[at] = c->mixed[last];
+    return BST_OK;
+}
+
 bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *c, int sensor,
-                                   const bst_run_arc *arc, int true_object) {
+                                   const bst_run_arc *arc, int true_object,
+                                   bst_run_new_object *made) {
+    memset(made, 0, sizeof *made); /* all bytes are in a saved state */
     if (arc->count < BST_OD_LEAST) {
         return BST_OK;
     }
@@ -83,7 +151,7 @@ bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *c, int sens
     c->figures.confirmed += item->arcs == 3;
     c->figures.wrong += c->mixed[at] && !was_wrong;
     if (!c->table) {
-        return BST_OK;
+        return confirm(ctx, c, at, arc->state.observer.time_s, made);
     }
 #define INT(v, known) \
     { .type = BST_COLUMN_INT, .is_null = !(known), .as.integer = (v) }
@@ -98,7 +166,8 @@ bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *c, int sens
                                 INT(2 * item->count - 6, !first),
                                 INT(true_object, true_object >= 0),
                                 INT(c->mixed[at], true)};
-    return bst_io_table_append(ctx, c->table, row);
+    BST_TRY(bst_io_table_append(ctx, c->table, row));
+    return confirm(ctx, c, at, arc->state.observer.time_s, made);
 }
 
 bst_candidate_figures bst_run_candidates_figures(const bst_run_candidates *c) {

@@ -5,6 +5,7 @@
 #include "boresight/archive.h"
 #include "sim/io/run_store.h"
 #include "sim/run/run_arcs.h"
+#include "sim/run/run_new_objects.h"
 #include "sim/world/world.h"
 
 /* Arcs without an object are linked (bst_od_link_arc); the truth is used for scoring only. */
@@ -22,11 +23,16 @@ bst_status bst_run_candidates_create(bst_ctx *ctx, const bst_world *world, bst_r
                                      bst_run_candidates **out) BST_MUST_CHECK;
 void bst_run_candidates_free(bst_run_candidates *candidates); /* NULL allowed */
 
-/* Takes an arc that belongs to no object of the catalogue, and writes its row.
+/* Takes an arc that belongs to no object that is known, and writes its row.
  *
- * Given:     true_object  that it belongs to; -1: none */
+ * Given:     true_object  that it belongs to; -1: none
+ * Returned:  *made        the new object if the candidate has three tracks or more, and an orbit
+ *                         that they determine (batch least squares with a factor on the variances;
+ *                         bst_od_solution.bend below 1); the candidate is then removed. Its id and
+ *                         noise are 0. updates 0: none */
 bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *candidates, int sensor,
-                                   const bst_run_arc *arc, int true_object) BST_MUST_CHECK;
+                                   const bst_run_arc *arc, int true_object,
+                                   bst_run_new_object *made) BST_MUST_CHECK;
 
 /* Figures so far. */
 bst_candidate_figures bst_run_candidates_figures(const bst_run_candidates *candidates);

@@ -1,18 +1,15 @@
 #include "sim/run/run_custody.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cjson/cJSON.h>
-
 #include "boresight/rng.h"
-#include "sim/core/json_number.h"
 #include "sim/eval/consistency.h"
 #include "sim/run/run_arcs.h"
 #include "sim/run/run_candidates.h"
-#include "sim/run/run_summary.h"
+#include "sim/run/run_custody_tables.h"
+#include "sim/run/run_new_objects.h"
 #include "tracker/orbit/custody.h"
 
 /* directions that an update needs: with fewer the tracker's state is better */
@@ -55,49 +52,10 @@ struct bst_run_custody {
     double *place_m[3]; /* [object] */
     bst_run_arcs *arcs;
     bst_run_candidates *candidates;
+    bst_run_new_objects new_objects;
     bst_io_table *tracks, *objects;
     bst_custody_figures figures;
 };
-
-#define INT(name, unit, doc) \
-    { name, BST_COLUMN_INT, unit, doc }
-#define REAL(name, unit, doc) \
-    { name, BST_COLUMN_REAL, unit, doc }
-
-static const bst_io_column track_columns[] = {
-    INT("sensor", "", "row of the table sensors"),
-    INT("track_id", "", "of the sensor's tracker"),
-    REAL("time_s", "s", "middle of the last exposure with a detection, since the epoch"),
-    INT("hits", "", "detections of the track"),
-    INT("candidates", "", "objects whose predicted direction and rate agree"),
-    INT("object", "", "object that the track updated: id in truth; NULL: none"),
-    INT("true_object", "", "object that the track belongs to; NULL: none"),
-    REAL("chi2", "", "of the nearest candidate, 4 degrees of freedom; NULL: none"),
-    REAL("nees", "", "error of the updated elements squared, by their covariance, 6 degrees"),
-};
-
-static const bst_io_column object_columns[] = {
-    INT("object", "", "index in the scenario: id in truth"),
-    {"name", BST_COLUMN_TEXT, "", "name of the object"},
-    INT("norad", "", "catalogue number, 0: none"),
-    INT("updates", "", "tracks that updated its orbit"),
-    INT("cross_tags", "", "of these, tracks of another object, or of none"),
-    REAL("last_s", "s", "last update; NULL: none"),
-    REAL("age_s", "s", "time from the last update to the end"),
-    REAL("sigma_m", "m", "standard deviation of the position at the end"),
-    REAL("error_m", "m", "error of the position at the end"),
-    REAL("nees", "", "error of the elements squared, by their covariance, 6 degrees of freedom"),
-    REAL("chi2_mean", "", "mean of the tracks' chi-square, 4 degrees of freedom each"),
-};
-
-static bst_io_value whole_number(int64_t value, bool known) {
-    return (bst_io_value){.type = BST_COLUMN_INT, .is_null = !known, .as.integer = value};
-}
-
-static bst_io_value number(double value) {
-    bool known = isfinite(value);
-    return (bst_io_value){.type = BST_COLUMN_REAL, .is_null = !known, .as.real = value};
-}
 
 /* ---- making it ---- */
 
@@ -162,16 +120,6 @@ static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, const bst_scen
                           "false");
 }
 
-static bst_status make_tables(bst_ctx *ctx, bst_run_custody *c, bst_run *store) {
-    BST_TRY(bst_io_table_create(ctx, store, "custody_tracks",
-                                "Tracks that were correlated with the catalogue, as they ended.",
-                                track_columns, sizeof track_columns / sizeof *track_columns,
-                                &c->tracks));
-    return bst_io_table_create(ctx, store, "custody", "Orbits of the catalogue at the end.",
-                               object_columns, sizeof object_columns / sizeof *object_columns,
-                               &c->objects);
-}
-
 bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
                                   const bst_scenario *scenario, bst_run *store,
                                   bst_run_custody **out) {
@@ -207,7 +155,9 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
                  : status;
     status =
         status == BST_OK ? bst_run_candidates_create(ctx, world, store, &c->candidates) : status;
-    status = status == BST_OK && store ? make_tables(ctx, c, store) : status;
+    status = status == BST_OK && store
+                 ? bst_run_custody_tables_create(ctx, store, &c->tracks, &c->objects)
+                 : status;
     if (status != BST_OK) {
         bst_run_custody_free(c);
         return status;
@@ -221,6 +171,7 @@ void bst_run_custody_free(bst_run_custody *c) {
         bst_world_view_free(c->view);
         bst_run_arcs_free(c->arcs);
         bst_run_candidates_free(c->candidates);
+        bst_run_new_objects_clear(&c->new_objects);
         free(c->pixel_rad);
         free(c->orbits);
         free(c->filters);
@@ -271,45 +222,91 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
     }
     BST_TRY(bst_run_arcs_archive(c->arcs, archive));
     BST_TRY(bst_run_candidates_archive(c->candidates, archive));
+    BST_TRY(bst_run_new_objects_archive(&c->new_objects, c->object_count, archive));
     BST_ARCHIVE(archive, c->figures);
     return BST_OK;
 }
 
 /* ---- correlation ---- */
 
-/* Whether the tabulated position of an object may be on the line of sight. */
-static bool may_be(const bst_run_custody *c, int object, const bst_custody_observation *z) {
-    const bst_vec3 place = {c->place_m[0][object], c->place_m[1][object], c->place_m[2][object]};
+/* Whether an object whose position is known within `within_m` and by its filter may be on the line
+ * of sight. */
+static bool may_be(const bst_custody_orbit *orbit, const bst_custody_filter *f, bst_vec3 place,
+                   double within_m, const bst_custody_observation *z) {
     if (isnan(place.x)) {
         return true;
     }
     bst_vec3 line = bst_vec3_sub(place, z->observer.position_m);
     double along = bst_vec3_dot(line, z->direction);
     double across2 = bst_vec3_dot(line, line) - along * along;
-    const bst_custody_filter *f = &c->filters[object];
     double days = z->observer.time_s / BST_DAY_S, variance = 0.0;
     for (int k = BST_CUSTODY_ECC_X; k < BST_CUSTODY_ALONG; k++) {
         variance += f->p[k][k];
     }
     /* a mean anomaly moves the object most at perigee, by the speed there over the mean one */
-    double e = c->orbits[object].elements.eccentricity;
+    double e = orbit->elements.eccentricity;
     variance += (1.0 + e) / (1.0 - e) *
                 (f->p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] +
                  days * (2.0 * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] +
                          days * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT]));
-    double reach = TABLE_REACH_M + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
+    double reach = within_m + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
     return along > -reach && across2 < reach * reach;
 }
 
-/* Objects in the gate of an observation. */
+/* Objects in the gate of an observation. Indices from object_count on are those of new objects. */
 typedef struct match {
     int count;                  /* in the gate */
     int close;                  /* whose light may be in the image, the best one left out */
     int best, true_object;      /* -1: none */
+    bool best_is_close;         /* it is one of the close ones */
     double chi2, merit, second; /* of the best; merit: chi-square + log determinant */
 } match;
 
-/* Finds the object that an observation belongs to by the catalogue, and by the truth. */
+/* Compares an observation with what an object's filter predicts. */
+static void compare_object(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                           int index, double fwhm, const bst_custody_observation *z, match *out) {
+    bst_custody_prediction p;
+    if (!bst_custody_predict(orbit, filter, z, &p)) {
+        return;
+    }
+    const double sigma = sqrt(p.covariance[0][0] + p.covariance[1][1]);
+    const bool close =
+        hypot(p.innovation[0], p.innovation[1]) < fwhm + fmin(BLEND_SIGMAS * sigma, fwhm);
+    out->close += close;
+    if (!(p.chi2 < GATE)) {
+        return;
+    }
+    double merit = p.chi2 + p.log_determinant;
+    out->count++;
+    if (merit < out->merit) {
+        out->second = out->merit;
+        out->merit = merit;
+        out->chi2 = p.chi2;
+        out->best = index;
+        out->best_is_close = close;
+    } else {
+        out->second = fmin(out->second, merit);
+    }
+}
+
+/* Compares an observation with the new objects. */
+static void find_new_object(bst_run_custody *c, int sensor, const bst_custody_observation *z,
+                            match *out) {
+    for (int i = 0; i < c->new_objects.count; i++) {
+        bst_run_new_object *o = &c->new_objects.items[i];
+        bst_vec3 place, unused;
+        bst_run_new_object_advance(o, z->observer.time_s);
+        if (!bst_custody_state(&o->orbit, o->filter.x, z->observer.time_s, &place, &unused)) {
+            continue;
+        }
+        place = bst_mat3_mul_vec(&z->gcrf_from_teme, place);
+        if (may_be(&o->orbit, &o->filter, place, TABLE_REACH_M, z)) {
+            compare_object(&o->orbit, &o->filter, c->object_count + i, c->fwhm_rad[sensor], z, out);
+        }
+    }
+}
+
+/* Finds the object that an observation belongs to by the filters, and by the truth. */
 static void find_object(bst_run_custody *c, int sensor, const bst_custody_observation *z,
                         match *out) {
     *out =
@@ -317,12 +314,12 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
     const double time_s = z->observer.time_s;
     const bst_world_state eye = {z->observer.position_m, z->observer.velocity_mps};
     double nearest = TRACK_PX * c->pixel_rad[sensor];
-    bool best_is_close = false;
     (void)bst_world_places(c->world, time_s, c->place_m[0], c->place_m[1], c->place_m[2]);
     for (int i = 0; i < c->object_count; i++) {
+        const bst_vec3 place = {c->place_m[0][i], c->place_m[1][i], c->place_m[2][i]};
         bst_world_sight sight;
         bst_ctx quiet = {0}; /* an orbit that has ended is no error here */
-        if (!may_be(c, i, z) ||
+        if (!may_be(&c->orbits[i], &c->filters[i], place, TABLE_REACH_M, z) ||
             bst_world_view_sight_from(&quiet, c->view, &eye, i, time_s, &sight) != BST_OK ||
             sight.range_m < ITSELF_M) {
             continue;
@@ -332,35 +329,13 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
             nearest = away;
             out->true_object = i;
         }
-        bst_custody_prediction p;
-        if (!(c->orbits[i].a_m > 0.0)) {
-            continue;
-        }
-        bst_custody_add_process_noise(&c->config, time_s, &c->filters[i]);
-        if (!bst_custody_predict(&c->orbits[i], &c->filters[i], z, &p)) {
-            continue;
-        }
-        const double fwhm = c->fwhm_rad[sensor];
-        const double sigma = sqrt(p.covariance[0][0] + p.covariance[1][1]);
-        const bool close =
-            hypot(p.innovation[0], p.innovation[1]) < fwhm + fmin(BLEND_SIGMAS * sigma, fwhm);
-        out->close += close;
-        if (!(p.chi2 < GATE)) {
-            continue;
-        }
-        double merit = p.chi2 + p.log_determinant;
-        out->count++;
-        if (merit < out->merit) {
-            out->second = out->merit;
-            out->merit = merit;
-            out->chi2 = p.chi2;
-            out->best = i;
-            best_is_close = close;
-        } else {
-            out->second = fmin(out->second, merit);
+        if (c->orbits[i].a_m > 0.0) {
+            bst_custody_add_process_noise(&c->config, time_s, &c->filters[i]);
+            compare_object(&c->orbits[i], &c->filters[i], i, c->fwhm_rad[sensor], z, out);
         }
     }
-    out->close -= best_is_close;
+    find_new_object(c, sensor, z, out);
+    out->close -= out->best_is_close;
 }
 
 /* Updates an object with the directions that were measured, which do not have the process noise of
@@ -373,6 +348,79 @@ static bool update(const bst_custody_orbit *orbit, const bst_run_arc *arc,
                                                arc->count, filter);
 }
 
+/* Whether a catalogued object's orbit is that of a new one. */
+static bool is_object(const bst_run_custody *c, int object, const bst_run_new_object *o,
+                      double time_s) {
+    double chi2;
+    return c->orbits[object].a_m > 0.0 &&
+           bst_run_new_object_is(&c->orbits[object], &c->filters[object], &o->orbit, &o->filter,
+                                 time_s, &chi2);
+}
+
+/* Adds a new object. If its orbit is that of exactly one object that is known, that one starts anew
+ * on it instead. */
+static bst_status add_new_object(bst_ctx *ctx, bst_run_custody *c, const bst_run_new_object *o) {
+    const double time_s = -o->orbit.epoch_offset_s;
+    int found = 0, which = -1;
+    for (int i = 0; i < c->object_count; i++) {
+        bool same = is_object(c, i, o, time_s);
+        found += same;
+        which = same ? i : which;
+    }
+    for (int i = 0; i < c->new_objects.count; i++) {
+        const bst_run_new_object *own = &c->new_objects.items[i];
+        double chi2;
+        bool same =
+            bst_run_new_object_is(&own->orbit, &own->filter, &o->orbit, &o->filter, time_s, &chi2);
+        found += same;
+        which = same ? c->object_count + i : which;
+    }
+    if (found != 1) {
+        return bst_run_new_objects_add(ctx, &c->new_objects, o);
+    }
+    c->figures.new_matched++;
+    if (which >= c->object_count) {
+        bst_run_new_object *own = &c->new_objects.items[which - c->object_count];
+        own->updates += o->updates;
+        own->cross_tags += own->true_object == o->true_object ? 0 : o->updates;
+        own->last_s = fmax(own->last_s, o->last_s);
+        return BST_OK;
+    }
+    bst_custody_filter anew;
+    if (bst_run_new_object_carry(&o->orbit, &o->filter, &c->orbits[which], time_s, &anew)) {
+        score *s = &c->scores[which];
+        c->filters[which] = anew;
+        s->updates += o->updates;
+        s->cross_tags += o->true_object == which ? 0 : o->updates;
+        s->last_s = isnan(s->last_s) ? o->last_s : fmax(s->last_s, o->last_s);
+    }
+    return BST_OK;
+}
+
+/* Notes the update of an object in its score. Returns its NEES; NAN: it is a new one. */
+static double note_update(bst_run_custody *c, const match *m, double time_s) {
+    if (m->best >= c->object_count) {
+        bst_run_new_object *o = &c->new_objects.items[m->best - c->object_count];
+        const bool crossed = o->true_object < 0 || o->true_object != m->true_object;
+        c->figures.new_tracks++;
+        c->figures.cross_tags += crossed;
+        o->updates++;
+        o->cross_tags += crossed;
+        o->chi2_sum += m->chi2;
+        o->chi2_count++;
+        o->last_s = fmax(o->last_s, time_s);
+        return NAN;
+    }
+    score *s = &c->scores[m->best];
+    const bool crossed = m->best != m->true_object;
+    c->figures.cross_tags += crossed;
+    s->updates++;
+    s->cross_tags += crossed;
+    s->chi2_sum += m->chi2;
+    s->last_s = isnan(s->last_s) ? time_s : fmax(s->last_s, time_s);
+    return bst_custody_nees(&c->filters[m->best]);
+}
+
 /* Correlates a track that has ended, and updates its object. */
 static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_arc *arc) {
     bst_run_custody *c = user;
@@ -380,40 +428,38 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     match m;
     find_object(c, sensor, z, &m);
     bst_custody_figures *f = &c->figures;
+    const int new_one = m.best - c->object_count; /* index of it; below 0: catalogued */
     /* an image of two objects is that of neither, and may be in no one's gate */
     bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN && m.close == 0;
     bool blended = m.best < 0 && m.close > 0;
-    bool updated = clear && update(&c->orbits[m.best], arc, &c->filters[m.best]);
+    bool updated = clear && (new_one < 0 ? update(&c->orbits[m.best], arc, &c->filters[m.best])
+                                         : update(&c->new_objects.items[new_one].orbit, arc,
+                                                  &c->new_objects.items[new_one].filter));
     f->tracks++;
+    f->correlated += updated;
     f->ambiguous += (m.best >= 0 && !clear) || blended;
     f->uncorrelated += (m.best < 0 && !blended) || (clear && !updated);
-    double nees = NAN;
-    if (updated) {
-        score *s = &c->scores[m.best];
-        bool crossed = m.best != m.true_object;
-        f->correlated++;
-        f->cross_tags += crossed;
-        s->updates++;
-        s->cross_tags += crossed;
-        s->chi2_sum += m.chi2;
-        s->last_s = isnan(s->last_s) ? z->observer.time_s : fmax(s->last_s, z->observer.time_s);
-        nees = bst_custody_nees(&c->filters[m.best]);
-    }
+    const double nees = updated ? note_update(c, &m, z->observer.time_s) : NAN;
     if (m.best < 0 && !blended) {
-        BST_TRY(bst_run_candidates_take(ctx, c->candidates, sensor, arc, m.true_object));
+        bst_run_new_object made;
+        BST_TRY(bst_run_candidates_take(ctx, c->candidates, sensor, arc, m.true_object, &made));
+        if (made.updates > 0) {
+            BST_TRY(add_new_object(ctx, c, &made));
+        }
     }
     if (!c->tracks) {
         return BST_OK;
     }
-    const bst_io_value row[] = {whole_number(sensor, true),
-                                whole_number(arc->id, true),
-                                number(z->observer.time_s),
-                                whole_number(arc->hits, true),
-                                whole_number(m.count, true),
-                                whole_number(m.best, updated),
-                                whole_number(m.true_object, m.true_object >= 0),
-                                number(m.chi2),
-                                number(nees)};
+    const bst_io_value row[] = {bst_custody_whole_number(sensor, true),
+                                bst_custody_whole_number(arc->id, true),
+                                bst_custody_number(z->observer.time_s),
+                                bst_custody_whole_number(arc->hits, true),
+                                bst_custody_whole_number(m.count, true),
+                                bst_custody_whole_number(m.best, updated && new_one < 0),
+                                bst_custody_whole_number(new_one + 1, updated && new_one >= 0),
+                                bst_custody_whole_number(m.true_object, m.true_object >= 0),
+                                bst_custody_number(m.chi2),
+                                bst_custody_number(nees)};
     return bst_io_table_append(ctx, c->tracks, row);
 }
 
@@ -428,17 +474,6 @@ bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *c, int sensor,
 }
 
 /* ---- end ---- */
-
-static int compare(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Value at a share of a sorted list; NAN: empty. */
-static double quantile(double *values, int count, double share) {
-    qsort(values, (size_t)count, sizeof *values, compare);
-    return count > 0 ? values[(int)(share * (count - 1))] : NAN;
-}
 
 /* Writes the row of an object and adds it to the figures. */
 static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, double end_s,
@@ -458,17 +493,19 @@ static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, doubl
     if (!c->objects) {
         return BST_OK;
     }
-    const bst_io_value row[] = {whole_number(object, true),
-                                {.type = BST_COLUMN_TEXT, .as.text = info->name},
-                                whole_number(info->norad, true),
-                                whole_number(s->updates, true),
-                                whole_number(s->cross_tags, true),
-                                number(s->last_s),
-                                number(end_s - s->last_s),
-                                number(*sigma_m),
-                                number(error_m),
-                                number(*nees),
-                                number(s->updates > 0 ? s->chi2_sum / (double)s->updates : NAN)};
+    const bst_io_value row[] = {
+        bst_custody_whole_number(object, true),
+        {.type = BST_COLUMN_TEXT, .as.text = info->name},
+        bst_custody_whole_number(info->norad, true),
+        bst_custody_whole_number(s->updates, true),
+        bst_custody_whole_number(s->cross_tags, true),
+        bst_custody_number(s->last_s),
+        bst_custody_number(end_s - s->last_s),
+        bst_custody_number(*sigma_m),
+        bst_custody_number(error_m),
+        bst_custody_number(*nees),
+        bst_custody_number(s->updates > 0 ? s->chi2_sum / (double)s->updates : NAN),
+        bst_custody_whole_number(object, true)};
     return bst_io_table_append(ctx, c->objects, row);
 }
 
@@ -505,11 +542,22 @@ bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s
             nees_count += !isnan(nees);
         }
     }
+    bst_run_new_figures new_ones;
+    BST_TRY(
+        bst_run_new_objects_finish(ctx, &c->new_objects, c->world, c->objects, end_s, &new_ones));
+    f->new_objects = c->new_objects.count;
+    f->new_wrong = new_ones.wrong;
+    f->new_sigma_median_m = new_ones.sigma_median_m;
+    f->new_nees_mean = new_ones.nees_mean;
+    for (int i = 0; i < c->new_objects.count; i++) {
+        const int64_t object = c->new_objects.items[i].true_object;
+        f->new_wrong += object >= 0 && c->orbits[object].a_m > 0.0; /* it was catalogued */
+    }
     f->objects = count;
     f->age_mean_s = updated_count > 0 ? age_sum / updated_count : NAN;
-    f->sigma_median_m = quantile(sigmas, count, 0.5);
-    f->sigma_p90_m = quantile(sigmas, count, 0.9);
-    f->sigma_updated_median_m = quantile(updated, updated_count, 0.5);
+    f->sigma_median_m = bst_custody_quantile(sigmas, count, 0.5);
+    f->sigma_p90_m = bst_custody_quantile(sigmas, count, 0.9);
+    f->sigma_updated_median_m = bst_custody_quantile(updated, updated_count, 0.5);
     f->nees_mean = nees_count > 0 ? nees_sum / nees_count : NAN;
     double dof = (double)BST_CUSTODY_STATE * nees_count;
     f->nees_low = nees_count > 0 ? bst_eval_chi2_quantile(0.025, dof) / nees_count : NAN;
@@ -520,54 +568,4 @@ bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s
 bool bst_run_custody_figures(const bst_run_custody *c, bst_custody_figures *out) {
     *out = c ? c->figures : (bst_custody_figures){0};
     return c != NULL;
-}
-
-void bst_run_custody_add(const bst_run_custody *c, cJSON *manifest) {
-    if (!c) {
-        return;
-    }
-    const bst_custody_figures *f = &c->figures;
-    cJSON *node = cJSON_AddObjectToObject(manifest, "custody");
-    cJSON_AddNumberToObject(node, "objects", (double)f->objects);
-    cJSON_AddNumberToObject(node, "updated", (double)f->updated);
-    cJSON_AddNumberToObject(node, "in_custody", (double)f->in_custody);
-    cJSON_AddNumberToObject(node, "tracks", (double)f->tracks);
-    cJSON_AddNumberToObject(node, "correlated", (double)f->correlated);
-    cJSON_AddNumberToObject(node, "ambiguous", (double)f->ambiguous);
-    cJSON_AddNumberToObject(node, "uncorrelated", (double)f->uncorrelated);
-    cJSON_AddNumberToObject(node, "cross_tags", (double)f->cross_tags);
-    cJSON_AddNumberToObject(node, "unknown", (double)f->unknown);
-    cJSON_AddNumberToObject(node, "candidates", (double)f->candidates);
-    cJSON_AddNumberToObject(node, "candidates_confirmed", (double)f->candidates_confirmed);
-    cJSON_AddNumberToObject(node, "candidates_wrong", (double)f->candidates_wrong);
-    bst_json_add_number(node, "age_mean_s", f->age_mean_s);
-    bst_json_add_number(node, "sigma_median_m", f->sigma_median_m);
-    bst_json_add_number(node, "sigma_p90_m", f->sigma_p90_m);
-    bst_json_add_number(node, "sigma_updated_median_m", f->sigma_updated_median_m);
-    bst_json_add_number(node, "nees_mean", f->nees_mean);
-    bst_json_add_number(node, "nees_low", f->nees_low);
-    bst_json_add_number(node, "nees_high", f->nees_high);
-}
-
-void bst_run_custody_print(const bst_run_custody *c) {
-    if (!c) {
-        return;
-    }
-    const bst_custody_figures *f = &c->figures;
-    printf("custody\n");
-    bst_run_print_row("objects", "%.0f", (double)f->objects, "");
-    bst_run_print_row("updated", "%.0f", (double)f->updated, "");
-    bst_run_print_row("in custody", "%.0f", (double)f->in_custody, "");
-    bst_run_print_row("tracks", "%.0f", (double)f->tracks, "");
-    bst_run_print_row("correlated", "%.0f", (double)f->correlated, "");
-    bst_run_print_row("ambiguous", "%.0f", (double)f->ambiguous, "");
-    bst_run_print_row("uncorrelated", "%.0f", (double)f->uncorrelated, "");
-    bst_run_print_row("cross-tags", "%.0f", (double)f->cross_tags, "");
-    bst_run_print_row("candidate objects", "%.0f", (double)f->candidates, "of two tracks or more");
-    bst_run_print_row("of three or more", "%.0f", (double)f->candidates_confirmed, "");
-    bst_run_print_row("with wrong tracks", "%.0f", (double)f->candidates_wrong, "");
-    bst_run_print_row("mean age", "%.0f", f->age_mean_s, "s");
-    bst_run_print_row("median uncertainty", "%.0f", f->sigma_median_m, "m");
-    bst_run_print_row("of updated objects", "%.0f", f->sigma_updated_median_m, "m");
-    bst_run_print_row("NEES of updated objects", "%.3f", f->nees_mean, "(6 if consistent)");
 }

@@ -10,7 +10,8 @@
 
 struct cJSON;
 
-/* Filters of all objects on element sets; each confirmed track gives one update, when the tracker
+/* Filters of all objects on element sets, and of new objects whose orbits tracks without an object
+ * determine (run_new_objects.h); each confirmed track gives one update, when the tracker
  * no longer lists it. A track that the tracker resumes after that is not used again. The truth is
  * used for the error that the catalogue begins with, which it lacks, and for scoring. Observers are
  * where they are in truth: navigation errors are left out. */
@@ -26,6 +27,11 @@ typedef struct bst_custody_figures {
     int64_t uncorrelated; /* with none, or the filter has no state there */
     int64_t unknown;      /* objects that the catalogue lacks, by record/custody_unknown_share */
     int64_t candidates, candidates_confirmed, candidates_wrong; /* bst_candidate_figures */
+    /* orbits of candidates that became objects; tracks that updated them after that, which are
+     * correlated ones too; new objects of tracks of different objects or of none, or of an object
+     * that is known; candidates whose orbit was that of a known object, and updated it */
+    int64_t new_objects, new_tracks, new_wrong, new_matched;
+    double new_sigma_median_m, new_nees_mean; /* at the end; NAN: none */
     int64_t cross_tags;                 /* correlated with another object than that of the truth */
     double age_mean_s;                  /* since the last update, of updated objects; NAN: none */
     double sigma_median_m, sigma_p90_m; /* of the position at the end, of all objects */

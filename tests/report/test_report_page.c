@@ -390,7 +390,8 @@ static void custody(void **state) {
              " \"tracks\": 9, \"correlated\": 6, \"ambiguous\": 2, \"uncorrelated\": 1,"
              " \"cross_tags\": 5, \"age_mean_s\": 321.5, \"sigma_median_m\": 951,"
              " \"sigma_p90_m\": 1500, \"sigma_updated_median_m\": 432, \"nees_mean\": 6.25,"
-             " \"nees_low\": 5.5, \"nees_high\": 6.5}}",
+             " \"nees_low\": 5.5, \"nees_high\": 6.5, \"candidates\": 4, \"new_objects\": 3,"
+             " \"new_wrong\": 1}}",
              (int)strlen(manifest) - 1, manifest);
     make_run(&t, own);
     run_tables_sql(&t,
@@ -409,6 +410,7 @@ static void custody(void **state) {
     expect_card(part, "objects updated", "3", "last 321.5 s ago, mean");
     expect_card(part, "tracks correlated", "6", "of 9; 2 ambiguous, 1 of no object");
     expect_card(part, "cross-tags", "5", "tracks of another object by the truth");
+    expect_card(part, "new objects", "3", "of 4 candidates; 1 wrong by the truth");
     expect_card(part, "uncertainty of updated objects, median", "432",
                 "all objects: 951 m, 90 % below 1500 m");
     expect_card(part, "NEES of updated objects", "6.25", "5.50 to 6.50 if consistent (95 %)");

@@ -96,6 +96,9 @@ static void directions_are_thinned_out(void **state) {
     l = (bst_od_linker){.count = 0};
     for (int pass = 0; pass < 5; pass++) {
         arc_of(0, 600.0 + 6000.0 * pass, pass, z);
+        for (int i = 1; i < DIRECTIONS; i++) {
+            z[i].shared_change = 0.125;
+        }
         assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S), 0);
         assert_int_equal(l.items[0].arcs, pass + 1);
         assert_true(l.items[0].count <= BST_OD_LINK_DIRECTIONS);
@@ -103,6 +106,35 @@ static void directions_are_thinned_out(void **state) {
                          618.0 + 6000.0 * pass, 0.0);
     }
     assert_true(l.items[0].count >= BST_OD_LINK_DIRECTIONS / 2);
+    /* every second one of the first four arcs is left: shared errors change twice as much between
+     * them, and arcs share none */
+    for (int i = 1; i < l.items[0].count; i++) {
+        const double change = l.items[0].directions[i].shared_change;
+        const double own = i < 2 * DIRECTIONS ? 0.25 : 0.125;
+        const int arc = i < 2 * DIRECTIONS ? DIRECTIONS / 2 : DIRECTIONS;
+        if (i % arc == 0) {
+            assert_true(isinf(change));
+        } else {
+            bst_assert_close(change, own, 0.0);
+        }
+    }
+}
+
+/* An item that is removed gives its place to the last one. */
+static void items_are_dropped(void **state) {
+    (void)state;
+    static bst_od_linker l;
+    const bst_od_motion motion = {.forces = NULL};
+    bst_od_observation z[DIRECTIONS];
+    l = (bst_od_linker){.count = 0};
+    for (int k = 0; k < BODIES; k++) {
+        arc_of(k, 600.0, k, z);
+        assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S), k);
+    }
+    bst_od_linker_drop(&l, 0);
+    assert_true(l.count == 2 && l.items[0].id == 3 && l.items[1].id == 2);
+    bst_od_linker_drop(&l, 1);
+    assert_true(l.count == 1 && l.items[0].id == 3);
 }
 
 static bst_status archive_linker(void *self, bst_archive *archive) {
@@ -133,9 +165,9 @@ static void a_linker_is_saved_and_restored(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(arcs_of_an_object_are_linked),
-                                       cmocka_unit_test(old_arcs_are_given_up),
-                                       cmocka_unit_test(directions_are_thinned_out),
-                                       cmocka_unit_test(a_linker_is_saved_and_restored)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(arcs_of_an_object_are_linked), cmocka_unit_test(old_arcs_are_given_up),
+        cmocka_unit_test(directions_are_thinned_out), cmocka_unit_test(items_are_dropped),
+        cmocka_unit_test(a_linker_is_saved_and_restored)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,9 +17,6 @@ enum {
     MOST_ITERATIONS = 5,
     MOST_REJECTED = 4 /* of the directions of an arc one in so many may be outliers */
 };
-/* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
- * Moon: 0.02 degrees), and differences are those of osculating elements. */
-#define LEAST_INCLINATION_RAD (0.2 * BST_DEG_RAD)
 
 /* ------------------------------------------------------------------ Elements */
 
@@ -107,7 +104,7 @@ static bool near_equator_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_
  * False: there are none. */
 static bool motion(const bst_custody_orbit *o, const double x[N], int count, const double *time_s,
                    bst_vec3 *r, bst_vec3 *v) {
-    const bool flat = o->elements.inclination_rad < LEAST_INCLINATION_RAD;
+    const bool flat = o->elements.inclination_rad < BST_CUSTODY_LEAST_INCLINATION_RAD;
     bst_elements set = o->elements;
     bst_sgp4 *sgp4;
     if ((!flat && !elements_at(o, x, &set)) ||
@@ -555,6 +552,11 @@ bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat
     }
     z.factor = (BST_OD_PRIOR_DOF + quality.rest) / (BST_OD_PRIOR_DOF + quality.expected);
     return update(orbit, &z, filter, NULL);
+}
+
+bool bst_custody_state(const bst_custody_orbit *orbit, const double x[N], double time_s,
+                       bst_vec3 *position_teme_m, bst_vec3 *velocity_teme_mps) {
+    return motion(orbit, x, 1, &time_s, position_teme_m, velocity_teme_mps);
 }
 
 bool bst_custody_catalogued_position(const bst_custody_orbit *orbit, double time_s,

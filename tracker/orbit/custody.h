@@ -25,6 +25,10 @@ enum {
 
 enum { BST_CUSTODY_DIRECTIONS = 16 }; /* most of an update */
 
+/* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
+ * Moon: 0.02 degrees), and differences are those of osculating elements. */
+#define BST_CUSTODY_LEAST_INCLINATION_RAD (0.2 * BST_DEG_RAD)
+
 typedef struct bst_custody_config {
     double sigma_m;         /* of each component except DRIFT, at the epoch of the elements */
     double drift_m_per_day; /* standard deviation of DRIFT */
@@ -116,6 +120,12 @@ bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat
                                    const bst_od_observation *directions, int count,
                                    bst_custody_filter *filter);
 
+/* State (TEME, m and m/s) at `time_s` on the elements that differ from the orbit's by x. False:
+ * none.
+ */
+bool bst_custody_state(const bst_custody_orbit *orbit, const double x[BST_CUSTODY_STATE],
+                       double time_s, bst_vec3 *position_teme_m, bst_vec3 *velocity_teme_mps);
+
 /* Position (TEME, m) on the catalogued elements at `time_s`. False: no state. */
 bool bst_custody_catalogued_position(const bst_custody_orbit *orbit, double time_s,
                                      bst_vec3 *position_teme_m);
@@ -128,5 +138,39 @@ bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_cust
 /* Normalised estimation error squared against an object that moves on its catalogued elements; 6
  * degrees of freedom. NAN: the covariance is singular. */
 double bst_custody_nees(const bst_custody_filter *filter);
+
+/* A state with its covariance: TEME, m and m/s, order r, v. */
+typedef struct bst_custody_fix {
+    double time_s;          /* since the epoch of the run */
+    double epoch_utc_jd[2]; /* the same as a Julian date in two parts */
+    bst_vec3 position_m, velocity_mps;
+    double covariance[6][6];
+} bst_custody_fix;
+
+/* Orbit and filter of a new object.
+ *
+ * Given:     fix            at what becomes the epoch of the elements; its velocity is the
+ *                           derivative of positions
+ *            photocentre_m  as in bst_custody_orbit
+ * Returned:  elements without drag (B* 0), and a filter about them; false: no SGP4 orbit there, or
+ *            the covariance is singular
+ * Notes:     the covariance is carried to the elements by central differences of one standard
+ *            deviation along the columns of its root; near the equator to osculating ones. */
+bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_custody_orbit *orbit,
+                       bst_custody_filter *filter);
+
+/* Standard deviation of the drift that an object gains in a day as a random walk, so that its place
+ * a day after the epoch of its elements is as uncertain as by an unknown B* of 3e-4 per Earth
+ * radius, m. 0: no drag there. */
+double bst_custody_drag_noise_m_per_day(const bst_custody_orbit *orbit);
+
+/* Differences of the osculating elements of a filter's orbit from those of a state at `time_s`, in
+ * components as those of a filter but with ALONG at that time, and their covariance, to first
+ * order. bst_custody_nees(out) is the squared error of an orbit whose true state that is, and the
+ * sum of two such covariances belongs to the difference of two orbits. False: no state, or the
+ * covariance is singular. */
+bool bst_custody_difference(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                            double time_s, bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps,
+                            bst_custody_filter *out);
 
 #endif

@@ -13,22 +13,37 @@ static double most_chi2(int count) {
     return dof + MOST_SIGMAS * sqrt(2.0 * dof);
 }
 
+/* Appends a direction, whose shared error has changed by `change` since the one before. */
+static void append(bst_od_observation *out, int *n, const bst_od_observation *z, double change) {
+    out[*n] = *z;
+    out[(*n)++].shared_change = change;
+}
+
 /* Joins the directions of an item and of an arc in order of time; every second one of the item's
- * is left out until there is room. Returns their number. */
+ * is left out until there is room. Those of the item and of the arc share no errors. Returns their
+ * number. */
 static int join(const bst_od_linked *item, const bst_od_observation *arc, int count,
                 bst_od_observation out[BST_OD_LINK_DIRECTIONS]) {
     int every = 1, n = 0, k = 0;
     while ((item->count + every - 1) / every + count > BST_OD_LINK_DIRECTIONS) {
         every *= 2;
     }
+    bool from_arc = false;
     for (int i = 0; i < item->count; i += every) {
-        for (; k < count && arc[k].observer.time_s < item->directions[i].observer.time_s; k++) {
-            out[n++] = arc[k];
+        double change = item->directions[i].shared_change;
+        for (int left = i > 0 ? i - every + 1 : i; left < i; left++) {
+            change += item->directions[left].shared_change;
         }
-        out[n++] = item->directions[i];
+        for (; k < count && arc[k].observer.time_s < item->directions[i].observer.time_s; k++) {
+            append(out, &n, &arc[k], from_arc ? arc[k].shared_change : INFINITY);
+            from_arc = true;
+        }
+        append(out, &n, &item->directions[i], from_arc ? INFINITY : change);
+        from_arc = false;
     }
     for (; k < count; k++) {
-        out[n++] = arc[k];
+        append(out, &n, &arc[k], from_arc ? arc[k].shared_change : INFINITY);
+        from_arc = true;
     }
     return n;
 }
@@ -97,6 +112,11 @@ int bst_od_link_arc(bst_od_linker *l, const bst_od_motion *motion,
     }
     l->items[chosen] = best;
     return chosen;
+}
+
+void bst_od_linker_drop(bst_od_linker *l, int index) {
+    assert(l && index >= 0 && index < l->count);
+    l->items[index] = l->items[--l->count];
 }
 
 bst_status bst_od_linker_archive(bst_od_linker *l, bst_archive *archive) {

@@ -39,6 +39,9 @@ typedef struct bst_od_linker {
 int bst_od_link_arc(bst_od_linker *linker, const bst_od_motion *motion,
                     const bst_od_observation *directions, int count, double within_s);
 
+/* Removes an item; the last one takes its index. */
+void bst_od_linker_drop(bst_od_linker *linker, int index);
+
 /* Saves or restores the arcs and orbits. Errors: BST_ERR_FORMAT: a number of them is impossible */
 bst_status bst_od_linker_archive(bst_od_linker *linker, bst_archive *archive) BST_MUST_CHECK;
 

@@ -1,0 +1,122 @@
+/* Tracks without an object in a run: candidates, new objects, matches with the catalogue. */
+#include "tests/run/custody_support.h"
+
+/* Tracks of an object that the catalogue lacks become a candidate: two of one object are linked,
+ * also after a saved state, and a third confirms it. Those of a known object do not. */
+static void unknown_objects_become_candidates(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    const int unknown[6] = {0, 0, 0, 0, 0, 0}, known[6] = {1, 1, 1, 1, 1, 1};
+    bst_custody_figures f;
+    bst_run_custody *c = without_a(&ctx, world, NULL);
+    take_detected(&ctx, c, world, unknown, 1, 100.0);
+    take_detected(&ctx, c, world, known, 2, 300.0);
+    bst_archive *saved;
+    bst_assert_ok(&ctx, bst_archive_create(&ctx, &saved));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, saved, "it"));
+    bst_assert_ok(&ctx, bst_run_custody_archive(c, saved));
+    bst_assert_ok(&ctx, bst_archive_end(&ctx, saved));
+    size_t size;
+    const void *bytes = bst_archive_data(saved, &size);
+    bst_run_custody *again = without_a(&ctx, world, NULL);
+    bst_archive *read;
+    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &read));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, read, "it"));
+    bst_assert_ok(&ctx, bst_run_custody_archive(again, read));
+    bst_archive_free(read);
+    bst_archive_free(saved);
+    take_detected(&ctx, again, world, unknown, 3, 7000.0);
+    take_detected(&ctx, again, world, unknown, 4, 13000.0);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, again, 14000.0));
+    assert_true(bst_run_custody_figures(again, &f));
+    assert_true(f.unknown == 1 && f.uncorrelated == 3 && f.cross_tags == 0);
+    assert_true(f.candidates == 1 && f.candidates_confirmed == 1 && f.candidates_wrong == 0);
+    bst_run_custody_free(c);
+    bst_run_custody_free(again);
+    bst_world_free(world);
+}
+
+/* A confirmed candidate with an orbit becomes an object: a later track updates it, it is in the
+ * table `custody` with the error against the truth, also after a saved state. */
+static void candidates_become_objects(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch place;
+    bst_run *store;
+    bst_run_reader *run;
+    bst_custody_figures f;
+    bst_world *world = world_of_two();
+    const int unknown[6] = {0, 0, 0, 0, 0, 0};
+    scratch_make(&place);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
+    bst_run_custody *before = without_a(&ctx, world, NULL), *c = without_a(&ctx, world, store);
+    for (int k = 0; k < 3; k++) {
+        take_detected(&ctx, before, world, unknown, k + 1, 100.0 + 6900.0 * k);
+    }
+    copy_state(&ctx, before, c);
+    take_detected(&ctx, c, world, unknown, 4, 20000.0);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 25000.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.new_objects == 1 && f.new_tracks == 1 && f.new_wrong == 0 && f.new_matched == 0);
+    assert_true(f.uncorrelated == 3 && f.correlated == 1 && f.cross_tags == 0);
+    assert_true(f.unknown == 1 && f.candidates == 1);
+    assert_true(f.new_sigma_median_m > 10.0 && f.new_sigma_median_m < 1000.0);
+    /* the directions have no errors here; consistency is shown in test_custody_start.c */
+    assert_true(f.new_nees_mean > 0.0 && f.new_nees_mean < 6.0);
+    bst_run_custody_free(before);
+    bst_run_custody_free(c);
+    bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_reader_open(&ctx, scratch_path(&place, "run"), &run));
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody WHERE name = 'new 1' AND "
+                                        "object IS NULL AND true_object = 0 AND updates = 4 AND "
+                                        "cross_tags = 0 AND error_m < 4 * sigma_m AND nees > 0",
+                                        0, 0),
+                     1);
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody_tracks WHERE new_object = 1 "
+                                        "AND object IS NULL AND true_object = 0",
+                                        0, 0),
+                     1);
+    bst_run_reader_close(run);
+    bst_world_free(world);
+    scratch_remove(&place);
+}
+
+/* A new object's orbit that is that of a catalogued object, whose filter had lost it, starts that
+ * filter anew. */
+static void new_objects_match_the_catalogue(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_custody *c;
+    bst_custody_figures f;
+    const int own[6] = {0, 0, 0, 0, 0, 0};
+    const bst_custody_prediction far = {.innovation = {1.0, 1.0}, .chi2 = 1e3};
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
+    predicted = &far;
+    lost_norad = 44801;
+    for (int k = 0; k < 3; k++) {
+        take_detected(&ctx, c, world, own, k + 1, 100.0 + 6900.0 * k);
+    }
+    predicted = NULL;
+    lost_norad = 44802;
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 25000.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.uncorrelated == 3 && f.new_objects == 0 && f.new_matched == 1);
+    assert_true(f.updated == 1 && f.cross_tags == 0);
+    assert_true(f.nees_mean > 0.0 && f.nees_mean < 6.0); /* directions without errors */
+    bst_run_custody_free(c);
+    bst_world_free(world);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(unknown_objects_become_candidates),
+        cmocka_unit_test(candidates_become_objects),
+        cmocka_unit_test(new_objects_match_the_catalogue),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
