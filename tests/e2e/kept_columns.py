@@ -180,7 +180,8 @@ class Columns:
             cursor = db.execute(f'SELECT * FROM "{table}" ORDER BY rowid')
             keys = [d[0] for d in cursor.description]
             for row in cursor:
-                for key, value in zip(keys, row):
+                pairs = [(row[0], row[1])] if len(keys) == 2 and keys[1] == "value" else zip(keys, row)
+                for key, value in pairs:
                     self.put_value(f"{name} {table}.{key}", value)
         db.close()
 
