@@ -521,22 +521,17 @@ bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surr
     prepare(&b->painter);
     const painter p = b->painter;
     BST_TRY(paint_sky(ctx, &p, b, window));
-    /* where places are enough, discs are computed at them; the nodes then give the least value */
-    const bool at_places = b->places_only && b->step > 1 && bst_discs_any(&p.discs);
-    BST_TRY(set_nodes(ctx, &b->nodes, at_places ? STAR_NODES * b->step : b->step, window));
+    BST_TRY(set_nodes(ctx, &b->nodes, b->step, window));
     lattice *n = &b->nodes;
     for (int j = 0; j < n->rows; j++) {
         for (int i = 0; i < n->columns; i++) {
-            const int k = j * n->columns + i, x = n->x0 + i * n->step, y = n->y0 + j * n->step;
-            const float sky =
-                at_places ? interpolate(&b->sky, (float)x, (float)y) : b->sky.value[k];
-            n->value[k] = paint(&p, x, y, (double)sky);
+            int k = j * n->columns + i;
+            n->value[k] =
+                paint(&p, n->x0 + i * n->step, n->y0 + j * n->step, (double)b->sky.value[k]);
         }
     }
-    bool edge = at_places;
-    if (!at_places) {
-        BST_TRY(find_edge(ctx, &p, b, &edge));
-    }
+    bool edge;
+    BST_TRY(find_edge(ctx, &p, b, &edge));
     bool mapped = p.map_e > 0.0;
     if ((edge || mapped) && !b->places_only) {
         BST_TRY(edge ? paint_pixels(ctx, &p, b, window) : spread_nodes(ctx, b, window));
