@@ -280,9 +280,7 @@ static void bound_field(bst_camera *c) {
         g->stretch = fmax(g->stretch, fmax(along, across) + bend);
         g->shrink = fmin(g->shrink, fmin(along, across) - bend);
         double second = r * (6.0 * d->k1 + s * (20.0 * d->k2 + s * 42.0 * d->k3));
-        const double bent = fabs(second) + 6.0 * q;
-        g->curvature =
-            bent > g->curvature ? bent : g->curvature; /* not fmax: GCC 12 for arm64 fails */
+        g->curvature = fmax(g->curvature, fabs(second) + 6.0 * q);
     }
     g->shrink = fmax(g->shrink, 0.0);
 }
