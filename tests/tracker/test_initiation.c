@@ -208,10 +208,10 @@ static void pairs_across_a_missed_detection(void **state) {
                                .count = k == 3 ? 0 : 1};
             bst_mtt_step(mtt, &f);
             int n, mine = 0, confirmed = 0;
+            bst_vec3 first = place(0.0, 20.0 * AS, 0.0, &rate);
             const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &n);
             for (int t = 0; t < n; t++) {
-                bool at = bst_vec3_angle(tracks[t].first_direction, bst_vec3_unit(place(
-                                             0.0, 20.0 * AS, 0.0, &rate))) < 0.1 * PX;
+                bool at = bst_vec3_angle(tracks[t].first_direction, first) < 0.1 * PX;
                 mine += at && tracks[t].first_tick == 0 &&
                         fabs(bst_vec3_norm(tracks[t].state.rate_radps) - 20.0 * AS) < 1.0 * AS;
                 confirmed += tracks[t].status == BST_TRACK_CONFIRMED;
