@@ -180,9 +180,53 @@ static void births_from_blended_detections(void **state) {
     }
 }
 
+/* Without a cue, with existence probabilities: of an object that the second frame does not show,
+ * the third starts a track, beside false detections in the frames between, and the next confirm
+ * it. `gnn` waits for two frames in a row. */
+static void pairs_across_a_missed_detection(void **state) {
+    (void)state;
+    for (int gnn = 0; gnn < 2; gnn++) {
+        bst_ctx ctx = {0};
+        bst_mtt *mtt;
+        bst_mtt_params params = pixel_tracker(64, 16);
+        params.association = gnn ? BST_MTT_GNN : BST_MTT_PMB;
+        bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
+        for (int k = 0; k < 5; k++) {
+            bst_vec3 rate, other;
+            bst_mtt_detection seen[2] = {{.sky = {.direction = place(0.0, 20.0 * AS, k, &rate),
+                                                  .cov_11 = 0.01 * PX * PX,
+                                                  .cov_22 = 0.01 * PX * PX},
+                                          .v_mag = 10,
+                                          .v_mag_sigma = 0.05,
+                                          .snr = 50,
+                                          .length_rad = 2 * PX}};
+            seen[1] = seen[0];
+            seen[1].sky.direction = place(0.0, -40.0 * AS, 1.0, &other);
+            bst_mtt_frame f = {.tick = 1000 * k,
+                               .seconds = k,
+                               .detections = k == 1 ? &seen[1] : seen,
+                               .count = k == 3 ? 0 : 1};
+            bst_mtt_step(mtt, &f);
+            int n, mine = 0, confirmed = 0;
+            bst_vec3 first = place(0.0, 20.0 * AS, 0.0, &rate);
+            const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &n);
+            for (int t = 0; t < n; t++) {
+                bool at = bst_vec3_angle(tracks[t].first_direction, first) < 0.1 * PX;
+                mine += at && tracks[t].first_tick == 0 &&
+                        fabs(bst_vec3_norm(tracks[t].state.rate_radps) - 20.0 * AS) < 1.0 * AS;
+                confirmed += tracks[t].status == BST_TRACK_CONFIRMED;
+            }
+            assert_int_equal(mine, k >= 2 && !gnn);
+            assert_int_equal(confirmed, k == 4 && !gnn);
+        }
+        bst_mtt_free(mtt);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(births_from_blended_detections),
                                        cmocka_unit_test(pairs_have_the_cues_acceleration),
-                                       cmocka_unit_test(many_alarms_ask_for_more)};
+                                       cmocka_unit_test(many_alarms_ask_for_more),
+                                       cmocka_unit_test(pairs_across_a_missed_detection)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

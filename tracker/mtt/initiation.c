@@ -28,44 +28,38 @@ static double spread(const bst_mtt_detection *d) {
     return d->sky.cov_11 + d->sky.cov_22;
 }
 
-/* Finds the unused earlier detection whose pair rate with `detection` is nearest to the gate's
- * centre but farther than `beyond` (rad; negative: no limit), newest frame first; NULL: none.
- * Writes the distance to *beyond. */
-static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detection,
-                                  const rate_gate *gate, double *beyond, int *partner) {
-    for (int h = 0; h < mtt->history_count && h < gate->history; h++) {
-        bst_mtt_pool *pool = &mtt->history[h];
-        double dt = mtt->now.seconds - pool->seconds;
-        if (!(dt > 0.0) || dt > mtt->params.initiation_gap_s) {
+/* Finds the unused detection of an earlier frame whose pair rate with `detection` is nearest to the
+ * gate's centre but farther than `beyond` (rad; negative: no limit); negative: none. Writes the
+ * distance to *beyond. */
+static int find_partner(const bst_mtt *mtt, const bst_mtt_pool *pool,
+                        const bst_mtt_detection *detection, const rate_gate *gate, double *beyond) {
+    double dt = mtt->now.seconds - pool->seconds;
+    if (!(dt > 0.0) || dt > mtt->params.initiation_gap_s) {
+        return -1;
+    }
+    bst_vec3 d = detection->sky.direction;
+    bst_vec3 back = bst_tangent_exp(d, bst_vec3_scale(gate->rate_radps, -dt));
+    /* the trace bounds the largest axis of the error ellipse */
+    double reach = gate->gate_radps * dt + 3.0 * sqrt(2.0 * spread(detection));
+    int begin, end, partner = -1;
+    double best = INFINITY;
+    bst_mtt_pool_range(pool, back, reach, &begin, &end);
+    for (int i = begin; i < end; i++) {
+        int k = pool->order[i];
+        const bst_mtt_detection *earlier = &pool->items[k];
+        double off = bst_vec3_norm(bst_vec3_sub(earlier->sky.direction, back));
+        double noise = 3.0 * sqrt(spread(detection) + spread(earlier));
+        double dim = fabs(earlier->v_mag - detection->v_mag);
+        double dim_limit = 1.0 + 3.0 * hypot(earlier->v_mag_sigma, detection->v_mag_sigma);
+        if (pool->used[k] || off > gate->gate_radps * dt + noise || dim > dim_limit ||
+            off >= best || off <= *beyond) {
             continue;
         }
-        bst_vec3 d = detection->sky.direction;
-        bst_vec3 back = bst_tangent_exp(d, bst_vec3_scale(gate->rate_radps, -dt));
-        /* the trace bounds the largest axis of the error ellipse */
-        double reach = gate->gate_radps * dt + 3.0 * sqrt(2.0 * spread(detection));
-        int begin, end;
-        double best = INFINITY;
-        bst_mtt_pool_range(pool, back, reach, &begin, &end);
-        for (int i = begin; i < end; i++) {
-            int k = pool->order[i];
-            const bst_mtt_detection *earlier = &pool->items[k];
-            double off = bst_vec3_norm(bst_vec3_sub(earlier->sky.direction, back));
-            double noise = 3.0 * sqrt(spread(detection) + spread(earlier));
-            double dim = fabs(earlier->v_mag - detection->v_mag);
-            double dim_limit = 1.0 + 3.0 * hypot(earlier->v_mag_sigma, detection->v_mag_sigma);
-            if (pool->used[k] || off > gate->gate_radps * dt + noise || dim > dim_limit ||
-                off >= best || off <= *beyond) {
-                continue;
-            }
-            best = off;
-            *partner = k;
-        }
-        if (best < INFINITY || *beyond >= 0.0) {
-            *beyond = best;
-            return best < INFINITY ? pool : NULL;
-        }
+        best = off;
+        partner = k;
     }
-    return NULL;
+    *beyond = best;
+    return partner;
 }
 
 /* Nearest other unused detection of a frame within merge_rad of one of them; NULL: none. */
@@ -189,42 +183,53 @@ static bool has_started(const bst_mtt *mtt, const bst_mtt_detection *earlier,
     return false;
 }
 
+/* Starts tracks from one detection and its partners in the rate gate, newest frame first. */
+static void start_from(bst_mtt *mtt, int detection, const rate_gate *gate,
+                       const bst_mtt_frame *frame) {
+    const bst_mtt_detection *later = &mtt->now.items[detection];
+    int started = 0;
+    for (int h = 0; h < mtt->history_count && h < gate->history; h++) {
+        bst_mtt_pool *pool = &mtt->history[h];
+        double beyond = -1.0;
+        while (started < gate->partners) {
+            int partner = find_partner(mtt, pool, later, gate, &beyond);
+            if (partner < 0) {
+                break;
+            }
+            started++;
+            if (gate->partners > 1 && has_started(mtt, &pool->items[partner], later)) {
+                continue;
+            }
+            if (!bst_mtt_has_room(mtt, gate->rest, gate->reserve)) {
+                mtt->lost++;
+                return;
+            }
+            start_track(mtt, &pool->items[partner], pool, later, gate, frame);
+            if (gate->partners == 1) {
+                pool->used[partner] = true;
+                mtt->now.used[detection] = true;
+            }
+        }
+    }
+}
+
 /* Starts tracks from all pairs of detections in the rate gate. */
 static void start_pairs(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, bool from_cue) {
     for (int i = 0; i < mtt->now.count; i++) {
         if (mtt->now.used[i]) {
             continue;
         }
-        bst_mtt_detection *detection = &mtt->now.items[i];
+        bst_vec3 direction = mtt->now.items[i].sky.direction;
         if (from_cue && frame->expected_rate) {
-            if (!frame->expected_rate(frame->user, detection->sky.direction, &gate.rate_radps)) {
+            if (!frame->expected_rate(frame->user, direction, &gate.rate_radps)) {
                 continue;
             }
         } else if (from_cue) {
             gate.rate_radps =
-                bst_tangent_carry(frame->cue_direction, detection->sky.direction,
+                bst_tangent_carry(frame->cue_direction, direction,
                                   bst_tangent_project(frame->cue_direction, frame->cue_rate_radps));
         }
-        double beyond = -1.0;
-        for (int k = 0; k < gate.partners; k++) {
-            int partner = -1;
-            bst_mtt_pool *pool = find_partner(mtt, detection, &gate, &beyond, &partner);
-            if (!pool) {
-                break;
-            }
-            if (gate.partners > 1 && has_started(mtt, &pool->items[partner], detection)) {
-                continue;
-            }
-            if (!bst_mtt_has_room(mtt, gate.rest, gate.reserve)) {
-                mtt->lost++;
-                break;
-            }
-            start_track(mtt, &pool->items[partner], pool, detection, &gate, frame);
-            if (gate.partners == 1) {
-                pool->used[partner] = true;
-                mtt->now.used[i] = true;
-            }
-        }
+        start_from(mtt, i, &gate, frame);
     }
 }
 
@@ -255,11 +260,12 @@ void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
             .partners = most_partners(mtt)};
         start_pairs(mtt, gate, frame, true);
     }
-    /* without the cue the gate is wide: search only the newest frame, and keep a quarter of the
-     * slots free for pairs at the cue's rate */
+    /* without the cue the gate is wide: search only the newest frame, and the one before it where
+     * every pair may start a track; keep a quarter of the slots free for pairs at the cue's rate */
+    int partners = most_partners(mtt);
     rate_gate gate = {.gate_radps = params->max_rate_radps,
                       .reserve = params->max_tracks / 4,
-                      .history = 1,
-                      .partners = most_partners(mtt)};
+                      .history = partners > 1 ? 2 : 1,
+                      .partners = partners};
     start_pairs(mtt, gate, frame, false);
 }
