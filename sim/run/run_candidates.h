@@ -37,8 +37,9 @@ bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *candidates,
 /* Figures so far. */
 bst_candidate_figures bst_run_candidates_figures(const bst_run_candidates *candidates);
 
-/* Saves or restores arcs, orbits and figures. Errors: BST_ERR_FORMAT */
-bst_status bst_run_candidates_archive(bst_run_candidates *candidates,
+/* Saves or restores arcs, orbits and figures. Errors: BST_ERR_FORMAT, also for an object of the
+ * truth that the world lacks */
+bst_status bst_run_candidates_archive(bst_run_candidates *candidates, int world_objects,
                                       bst_archive *archive) BST_MUST_CHECK;
 
 #endif

@@ -221,7 +221,7 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
         archive_object(c, i, archive);
     }
     BST_TRY(bst_run_arcs_archive(c->arcs, archive));
-    BST_TRY(bst_run_candidates_archive(c->candidates, archive));
+    BST_TRY(bst_run_candidates_archive(c->candidates, c->object_count, archive));
     BST_TRY(bst_run_new_objects_archive(&c->new_objects, c->object_count, archive));
     BST_ARCHIVE(archive, c->figures);
     return BST_OK;

@@ -1,4 +1,7 @@
 /* Tracks without an object in a run: candidates, new objects, matches with the catalogue. */
+#include "sim/run/run_candidates.h"
+#include "sim/run/run_new_objects.h"
+#include "tests/archive_support.h"
 #include "tests/run/custody_support.h"
 
 /* Tracks of an object that the catalogue lacks become a candidate: two of one object are linked,
@@ -112,11 +115,46 @@ static void new_objects_match_the_catalogue(void **state) {
     bst_world_free(world);
 }
 
+/* Candidates or new objects of a world with so many objects. */
+typedef struct saved {
+    bst_run_candidates *candidates;
+    bst_run_new_objects *objects;
+    int world_objects;
+} saved;
+
+static bst_status archive_saved(void *self, bst_archive *archive) {
+    saved *s = self;
+    return s->candidates
+               ? bst_run_candidates_archive(s->candidates, s->world_objects, archive)
+               : bst_run_new_objects_archive(s->objects, s->world_objects, archive);
+}
+
+/* An object of the truth in a saved state is one of the world. */
+static void saved_candidates_are_of_the_world(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_candidates *c;
+    bst_run_new_object made;
+    const bst_run_arc arc = {.id = 1, .hits = 9, .count = BST_OD_LEAST};
+    bst_assert_ok(&ctx, bst_run_candidates_create(&ctx, world, NULL, &c));
+    bst_assert_ok(&ctx, bst_run_candidates_take(&ctx, c, 0, &arc, 2, &made));
+    saved self = {.candidates = c, .world_objects = 3};
+    test_saved bytes = test_save(archive_saved, &self);
+    bst_assert_ok(&ctx, test_restore(&ctx, archive_saved, &self, bytes));
+    self.world_objects = 2;
+    assert_int_equal(test_restore(&ctx, archive_saved, &self, bytes), BST_ERR_FORMAT);
+    free(bytes.bytes);
+    bst_run_candidates_free(c);
+    bst_world_free(world);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(unknown_objects_become_candidates),
         cmocka_unit_test(candidates_become_objects),
         cmocka_unit_test(new_objects_match_the_catalogue),
+        cmocka_unit_test(saved_candidates_are_of_the_world),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
