@@ -176,6 +176,13 @@ bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *n, cons
     return status;
 }
 
+/* Whether a restored object has an orbit and times that a run may have. */
+static bool is_possible(const bst_run_new_object *o) {
+    const double e = o->orbit.elements.eccentricity;
+    return fabs(o->orbit.epoch_offset_s) <= BST_OD_LONGEST_S && o->orbit.a_m > 0.0 && e >= 0.0 &&
+           e < 1.0 && isfinite(o->filter.noise_until_s) && isfinite(o->last_s);
+}
+
 bst_status bst_run_new_objects_archive(bst_run_new_objects *n, int world_objects,
                                        bst_archive *archive) {
     n->count = bst_archive_count(archive, n->count, MOST_OBJECTS);
@@ -183,6 +190,15 @@ bst_status bst_run_new_objects_archive(bst_run_new_objects *n, int world_objects
     for (int i = 0; i < n->count; i++) {
         bst_run_new_object *o = &n->items[i];
         BST_ARCHIVE(archive, *o);
+        if (!is_possible(o)) {
+            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                            "the saved state has new object %d on no ellipse (semi-major axis %g "
+                            "m, eccentricity %g), or with times that no run has (elements %g s "
+                            "before the epoch, allowed are %g; noise until %g s, updated at %g s)",
+                            i + 1, o->orbit.a_m, o->orbit.elements.eccentricity,
+                            o->orbit.epoch_offset_s, BST_OD_LONGEST_S, o->filter.noise_until_s,
+                            o->last_s);
+        }
         o->true_object = bst_archive_integer(archive, o->true_object, -1, world_objects - 1);
     }
     return BST_OK;

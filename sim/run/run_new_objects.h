@@ -63,8 +63,8 @@ bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *objects
                                       const bst_world *world, bst_io_table *table, double end_s,
                                       bst_run_new_figures *out) BST_MUST_CHECK;
 
-/* Saves or restores the objects. Errors: BST_ERR_MEMORY; BST_ERR_FORMAT: their number, or an object
- * of the truth that the world lacks */
+/* Saves or restores the objects. Errors: BST_ERR_MEMORY; BST_ERR_FORMAT: their number, orbit or
+ * times are impossible, or an object of the truth that the world lacks */
 bst_status bst_run_new_objects_archive(bst_run_new_objects *objects, int world_objects,
                                        bst_archive *archive) BST_MUST_CHECK;
 

@@ -149,12 +149,49 @@ static void saved_candidates_are_of_the_world(void **state) {
     bst_world_free(world);
 }
 
+/* A saved orbit that is no ellipse, or with a time that SGP4 would step to for ever, is an error. */
+static void saved_orbits_are_possible(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_run_new_object good = {
+        .orbit = {.elements = {.mean_motion_radpmin = 0.0044}, .a_m = 4.2e7}, .true_object = -1};
+    const double hostile[][5] = {/* epoch, a, e, noise until, last */
+                                 {1e300, 4.2e7, 0.0, 0.0, 0.0},  {NAN, 4.2e7, 0.0, 0.0, 0.0},
+                                 {0.0, 0.0, 0.0, 0.0, 0.0},      {0.0, NAN, 0.0, 0.0, 0.0},
+                                 {0.0, 4.2e7, -0.1, 0.0, 0.0},   {0.0, 4.2e7, 1.0, 0.0, 0.0},
+                                 {0.0, 4.2e7, 0.0, 0.0, NAN},    {0.0, 4.2e7, 0.0, NAN, 0.0},
+                                 {0.0, 4.2e7, 0.0, -INFINITY, 0}};
+    bst_run_new_objects n = {.count = 0};
+    saved self = {.objects = &n, .world_objects = 1};
+    bst_assert_ok(&ctx, bst_run_new_objects_add(&ctx, &n, &good));
+    test_saved bytes = test_save(archive_saved, &self);
+    bst_assert_ok(&ctx, test_restore(&ctx, archive_saved, &self, bytes));
+    free(bytes.bytes);
+    for (size_t i = 0; i < sizeof hostile / sizeof *hostile; i++) {
+        bst_run_new_object *o = &n.items[0];
+        bst_archive *damaged;
+        memcpy(o, &good, sizeof good);
+        o->orbit.epoch_offset_s = hostile[i][0];
+        o->orbit.a_m = hostile[i][1];
+        o->orbit.elements.eccentricity = hostile[i][2];
+        o->filter.noise_until_s = hostile[i][3];
+        o->last_s = hostile[i][4];
+        bst_assert_ok(&ctx, bst_archive_create(&ctx, &damaged));
+        bst_assert_ok(&ctx, bst_archive_begin(&ctx, damaged, "it"));
+        assert_int_equal(archive_saved(&self, damaged), BST_ERR_FORMAT);
+        assert_non_null(strstr(ctx.message, "new object 1"));
+        bst_archive_free(damaged);
+    }
+    bst_run_new_objects_clear(&n);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(unknown_objects_become_candidates),
         cmocka_unit_test(candidates_become_objects),
         cmocka_unit_test(new_objects_match_the_catalogue),
         cmocka_unit_test(saved_candidates_are_of_the_world),
+        cmocka_unit_test(saved_orbits_are_possible),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
