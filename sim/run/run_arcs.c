@@ -108,7 +108,8 @@ static bst_status archive_slot(const bst_run_arcs *a, slot *s, bst_archive *arch
     s->arc.count = bst_archive_count(archive, s->arc.count, BST_CUSTODY_DIRECTIONS);
     s->seen = bst_archive_integer(archive, s->seen, 0, MOST_SEEN);
     s->every = bst_archive_integer(archive, s->every, 1, MOST_SEEN);
-    s->tick = bst_archive_integer(archive, s->tick, 0, (int64_t)(BST_OD_LONGEST_S * a->tick_rate_hz));
+    s->tick =
+        bst_archive_integer(archive, s->tick, 0, (int64_t)(BST_OD_LONGEST_S * a->tick_rate_hz));
     for (int i = 0; i < s->arc.count; i++) {
         const double time_s = s->arc.directions[i].observer.time_s;
         if (!(time_s >= 0.0 && time_s <= BST_OD_LONGEST_S)) {

@@ -94,11 +94,16 @@ static void new_objects_match_the_catalogue(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_world *world = world_of_two();
+    scratch place;
+    bst_run *store;
+    bst_run_reader *run;
     bst_run_custody *c;
     bst_custody_figures f;
     const int own[6] = {0, 0, 0, 0, 0, 0};
     const bst_custody_prediction far = {.innovation = {1.0, 1.0}, .chi2 = 1e3};
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
+    scratch_make(&place);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), store, &c));
     predicted = &far;
     lost_norad = 44801;
     for (int k = 0; k < 3; k++) {
@@ -112,6 +117,76 @@ static void new_objects_match_the_catalogue(void **state) {
     assert_true(f.updated == 1 && f.cross_tags == 0);
     assert_true(f.nees_mean > 0.0 && f.nees_mean < 6.0); /* directions without errors */
     bst_run_custody_free(c);
+    bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_reader_open(&ctx, scratch_path(&place, "run"), &run));
+    /* none of the three tracks has a chi-square of this filter */
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody WHERE object = 0 AND updates "
+                                        "= 3 AND chi2_mean IS NULL",
+                                        0, 0),
+                     1);
+    bst_run_reader_close(run);
+    bst_world_free(world);
+    scratch_remove(&place);
+}
+
+/* An object of tracks that the filters do not explain, though the first new one has its orbit
+ * already: that one keeps it, and what it was updated by. */
+static void earlier_new_objects_keep_their_orbit(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch place;
+    bst_run *store;
+    bst_run_reader *run;
+    bst_custody_figures f;
+    bst_world *world = world_of_two();
+    const int unknown[6] = {0, 0, 0, 0, 0, 0};
+    const bst_custody_prediction far = {.innovation = {1.0, 1.0}, .chi2 = 1e3};
+    scratch_make(&place);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
+    bst_run_custody *c = without_a(&ctx, world, store);
+    predicted = &far;
+    lost_norad = -1;
+    for (int k = 0; k < 6; k++) { /* soon: the place must be known within 5 km */
+        take_detected(&ctx, c, world, unknown, k + 1,
+                      k < 3 ? 100.0 + 9900.0 * k : 6000.0 * k + 2500.0);
+    }
+    predicted = NULL;
+    lost_norad = 44802;
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 40000.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.uncorrelated == 6 && f.new_objects == 1 && f.new_matched == 1);
+    bst_run_custody_free(c);
+    bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_reader_open(&ctx, scratch_path(&place, "run"), &run));
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody WHERE name = 'new 1' AND "
+                                        "updates = 3 AND last_s < 20000",
+                                        0, 0),
+                     1);
+    bst_run_reader_close(run);
+    bst_world_free(world);
+    scratch_remove(&place);
+}
+
+/* A new object is wrong once, whatever makes it so: of none, of a catalogued one, a second one. */
+static void wrong_objects_are_counted_once(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_new_objects n = {.count = 0};
+    bst_run_new_figures f;
+    const bst_custody_orbit catalogue[3] = {{.a_m = 4.2e7}, {.a_m = 0.0}, {.a_m = 0.0}};
+    const int objects[] = {0, 0, 1, 2, 2, -1}, wrong[] = {1, 2, 2, 2, 3, 4};
+    for (int i = 0; i < 6; i++) {
+        const bst_run_new_object o = {.true_object = objects[i]};
+        bst_assert_ok(&ctx, bst_run_new_objects_add(&ctx, &n, &o));
+        bst_assert_ok(&ctx, bst_run_new_objects_finish(&ctx, &n, world, catalogue, NULL, 10.0, &f));
+        assert_int_equal(f.wrong, wrong[i]);
+    }
+    bst_run_new_objects_clear(&n);
     bst_world_free(world);
 }
 
@@ -124,9 +199,8 @@ typedef struct saved {
 
 static bst_status archive_saved(void *self, bst_archive *archive) {
     saved *s = self;
-    return s->candidates
-               ? bst_run_candidates_archive(s->candidates, s->world_objects, archive)
-               : bst_run_new_objects_archive(s->objects, s->world_objects, archive);
+    return s->candidates ? bst_run_candidates_archive(s->candidates, s->world_objects, archive)
+                         : bst_run_new_objects_archive(s->objects, s->world_objects, archive);
 }
 
 /* An object of the truth in a saved state is one of the world. */
@@ -149,7 +223,8 @@ static void saved_candidates_are_of_the_world(void **state) {
     bst_world_free(world);
 }
 
-/* A saved orbit that is no ellipse, or with a time that SGP4 would step to for ever, is an error. */
+/* A saved orbit that is no ellipse, or with a time that SGP4 would step to for ever, is an error.
+ */
 static void saved_orbits_are_possible(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -190,6 +265,8 @@ int main(void) {
         cmocka_unit_test(unknown_objects_become_candidates),
         cmocka_unit_test(candidates_become_objects),
         cmocka_unit_test(new_objects_match_the_catalogue),
+        cmocka_unit_test(earlier_new_objects_keep_their_orbit),
+        cmocka_unit_test(wrong_objects_are_counted_once),
         cmocka_unit_test(saved_candidates_are_of_the_world),
         cmocka_unit_test(saved_orbits_are_possible),
     };
