@@ -434,7 +434,10 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     const int new_one = m.best - c->object_count; /* index of it; below 0: catalogued */
     /* an image of two objects is that of neither, and may be in no one's gate */
     bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN && m.close == 0;
-    bool blended = m.best < 0 && m.close > 0;
+    const bool blended = m.best < 0 && m.close > 0;
+    /* One object beside an arc may be in its image, or may be elsewhere than a filter that is too
+     * sure says: only tracks that make a new orbit tell. */
+    const bool unknown = m.best < 0 && m.close < 2;
     bool updated = clear && (new_one < 0 ? update(&c->orbits[m.best], arc, &c->filters[m.best])
                                          : update(&c->new_objects.items[new_one].orbit, arc,
                                                   &c->new_objects.items[new_one].filter));
@@ -443,7 +446,7 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     f->ambiguous += (m.best >= 0 && !clear) || blended;
     f->uncorrelated += (m.best < 0 && !blended) || (clear && !updated);
     const double nees = updated ? note_update(c, &m, z->observer.time_s) : NAN;
-    if (m.best < 0 && !blended) {
+    if (unknown) {
         bst_run_new_object made;
         BST_TRY(bst_run_candidates_take(ctx, c->candidates, sensor, arc, m.true_object, &made));
         if (made.updates > 0) {

@@ -130,26 +130,6 @@ static bool motion(const bst_custody_orbit *o, const double x[N], int count, con
  * Automatica 36, 2000). */
 #define SPREAD 1.7320508075688772
 
-/* Lower triangular root of a covariance. False: it is singular. */
-static bool make_root(const double p[N][N], double root[N][N]) {
-    double unit[N];
-    for (int i = 0; i < N; i++) {
-        unit[i] = sqrt(p[i][i]);
-        for (int j = 0; j <= i; j++) {
-            root[i][j] = p[i][j] / (unit[i] * unit[j]);
-        }
-    }
-    if (!bst_cholesky_factor(&root[0][0], N, N, 1e-15)) {
-        return false;
-    }
-    for (int i = 0; i < N; i++) {
-        for (int j = 0; j < N; j++) {
-            root[i][j] = j <= i ? root[i][j] * unit[i] : 0.0;
-        }
-    }
-    return true;
-}
-
 /* What was measured: direction and rate of a track, or directions at some times. */
 typedef struct measurement {
     int times, size; /* size: numbers in all */
@@ -193,11 +173,12 @@ static bool residuals(const bst_custody_orbit *o, const double x[N], const measu
 
 /* Correlation of the photocentre's displacement at two directions of a pass. It turns with the line
  * of sight and grows with the phase angle, by about itself in a radian; as the object goes round,
- * both change by its mean motion at most beside the line of sight's own turn. */
+ * both change by its rate at perigee at most beside the line of sight's own turn. */
 static double photocentre_correlation(const bst_custody_orbit *o, const bst_od_observation *a,
                                       const bst_od_observation *b) {
-    const double turn =
-        o->elements.mean_motion_radpmin / 60.0 * (b->observer.time_s - a->observer.time_s);
+    const double e = o->elements.eccentricity, n = o->elements.mean_motion_radpmin / 60.0;
+    const double rate = n * sqrt((1.0 + e) / (1.0 - e)) / (1.0 - e);
+    const double turn = rate * (b->observer.time_s - a->observer.time_s);
     const bst_vec3 between = bst_vec3_sub(b->direction, a->direction);
     return exp(-0.5 * (turn * turn + bst_vec3_dot(between, between)));
 }
@@ -252,7 +233,7 @@ typedef struct linear {
 static bool linearise(const bst_custody_orbit *o, const double x[N], const double p[N][N],
                       const measurement *z, linear *out) {
     double root[N][N], y[M], range_m[BST_CUSTODY_DIRECTIONS], unused[BST_CUSTODY_DIRECTIONS];
-    if (!make_root(p, root) || !residuals(o, x, z, y, range_m)) {
+    if (!bst_custody_root(p, root) || !residuals(o, x, z, y, range_m)) {
         return false;
     }
     memcpy(out->y, y, sizeof y);
@@ -570,7 +551,8 @@ bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_cust
                                   double time_s, bst_vec3 *position_teme_m, double *sigma_m) {
     double root[N][N], sum = 0.0;
     bst_vec3 v;
-    if (!make_root(filter->p, root) || !motion(orbit, filter->x, 1, &time_s, position_teme_m, &v)) {
+    if (!bst_custody_root(filter->p, root) ||
+        !motion(orbit, filter->x, 1, &time_s, position_teme_m, &v)) {
         return false;
     }
     for (int k = 0; k < N; k++) {

@@ -135,6 +135,10 @@ bool bst_custody_catalogued_position(const bst_custody_orbit *orbit, double time
 bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                                   double time_s, bst_vec3 *position_teme_m, double *sigma_m);
 
+/* Lower triangular root of a covariance; the rest of `root` is 0. False: it is singular. */
+bool bst_custody_root(const double p[BST_CUSTODY_STATE][BST_CUSTODY_STATE],
+                      double root[BST_CUSTODY_STATE][BST_CUSTODY_STATE]) BST_MUST_CHECK;
+
 /* Normalised estimation error squared against an object that moves on its catalogued elements; 6
  * degrees of freedom. NAN: the covariance is singular. */
 double bst_custody_nees(const bst_custody_filter *filter);
