@@ -350,9 +350,9 @@ typedef struct pass {
 
 /* *out: all directions are off by `off_rad` along their first axes beside errors of their own. */
 static void make_pass(double off_rad, pass *out) {
-    static const double change[COUNT] = {9.0, 0.3, 0.8}, at_s[COUNT] = {0.0, 25.0, 90.0};
+    static const double change[COUNT] = {9.0, 0.3, 0.8}, at_s[COUNT] = {0.0, 60.0, 240.0};
     bst_ctx ctx = {0};
-    const bst_elements set = orbit_of(68.0, 0.3, 2.6);
+    const bst_elements set = orbit_of(68.0, 0.6, 6.0);
     const double offset_s = -20000.0;
     const bst_od_observer eye = observer_near(&set, offset_s);
     *out = (pass){.filter = {.x = {40.0, -25.0, 18.0, 30.0, -22.0, 35.0}}};
