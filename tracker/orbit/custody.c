@@ -73,10 +73,11 @@ static void ellipse_state(const bst_elements *set, bst_vec3 *r, bst_vec3 *v) {
     *v = bst_vec3_axpy(bst_vec3_scale(p, -rate * s), rate * root * c, q);
 }
 
-/* Motion of an orbit near the equator: the catalogued one, whose osculating elements differ by x.
- * What perturbations do to the difference, a thousandth of it in a revolution, is left out. */
-static bool near_equator_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_vec3 cat_v,
-                                const double x[N], double time_s, bst_vec3 *r, bst_vec3 *v) {
+/* Motion of an orbit near the equator or circular: the catalogued one, whose osculating elements
+ * differ by x. What perturbations do to the difference, a thousandth of it in a revolution, is left
+ * out. */
+static bool osculating_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_vec3 cat_v,
+                              const double x[N], double time_s, bst_vec3 *r, bst_vec3 *v) {
     const bst_astro_kepler_elements k =
         bst_astro_kepler_elements_of(BST_EARTH_MU_M3PS2, cat_r, cat_v);
     if (!(k.semi_major_axis_m > 0.0)) {
@@ -104,10 +105,10 @@ static bool near_equator_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_
  * False: there are none. */
 static bool motion(const bst_custody_orbit *o, const double x[N], int count, const double *time_s,
                    bst_vec3 *r, bst_vec3 *v) {
-    const bool flat = o->elements.inclination_rad < BST_CUSTODY_LEAST_INCLINATION_RAD;
+    const bool osculating = bst_custody_osculates(&o->elements);
     bst_elements set = o->elements;
     bst_sgp4 *sgp4;
-    if ((!flat && !elements_at(o, x, &set)) ||
+    if ((!osculating && !elements_at(o, x, &set)) ||
         bst_sgp4_create_near(NULL, &set, o->elements.eccentricity, BST_SGP4_WGS72,
                              BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
         return false;
@@ -115,7 +116,7 @@ static bool motion(const bst_custody_orbit *o, const double x[N], int count, con
     bool good = true;
     for (int i = 0; good && i < count; i++) {
         good = bst_sgp4_motion(sgp4, (o->epoch_offset_s + time_s[i]) / 60.0, &r[i], &v[i]) &&
-               (!flat || near_equator_motion(o, r[i], v[i], x, time_s[i], &r[i], &v[i]));
+               (!osculating || osculating_motion(o, r[i], v[i], x, time_s[i], &r[i], &v[i]));
     }
     bst_sgp4_free(sgp4);
     return good;

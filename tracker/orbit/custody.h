@@ -25,9 +25,14 @@ enum {
 
 enum { BST_CUSTODY_DIRECTIONS = 16 }; /* most of an update */
 
-/* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
- * Moon: 0.02 degrees), and differences are those of osculating elements. */
-#define BST_CUSTODY_LEAST_INCLINATION_RAD (0.2 * BST_DEG_RAD)
+/* Whether SGP4's periodics are not smooth in its elements, and differences are those of osculating
+ * elements: at inclinations below 0.2 degrees (Lyddane's, by Sun and Moon: 0.02 degrees), and at
+ * eccentricities below 1e-3 in orbits of 225 minutes or longer, whose eccentricity Sun and Moon
+ * change along the line of apsides, which a circular orbit lacks (up to 90 m at 26,560 km). */
+static inline bool bst_custody_osculates(const bst_elements *e) {
+    return e->inclination_rad < 0.2 * BST_DEG_RAD ||
+           (e->eccentricity < 1e-3 && e->mean_motion_radpmin < 2.0 * BST_PI / 225.0);
+}
 
 typedef struct bst_custody_config {
     double sigma_m;         /* of each component except DRIFT, at the epoch of the elements */

@@ -114,7 +114,7 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
         bst_custody_orbit_init(&quiet, &elements, -fix->time_s, photocentre_m, orbit) != BST_OK) {
         return false;
     }
-    const bool flat = elements.inclination_rad < BST_CUSTODY_LEAST_INCLINATION_RAD;
+    const bool osculating = bst_custody_osculates(&elements);
     for (int k = 0; k < N; k++) {
         double side[2][N], column[N];
         for (int s = 0; s < 2; s++) {
@@ -122,8 +122,8 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
             const bst_vec3 dr = {root[0][k], root[1][k], root[2][k]};
             const bst_vec3 dv = {root[3][k], root[4][k], root[5][k]};
             bst_elements near = elements;
-            if (!numbers_through(bst_vec3_axpy(r, to, dr), bst_vec3_axpy(v, to, dv), flat, &near,
-                                 side[s])) {
+            if (!numbers_through(bst_vec3_axpy(r, to, dr), bst_vec3_axpy(v, to, dv), osculating,
+                                 &near, side[s])) {
                 return false;
             }
         }
