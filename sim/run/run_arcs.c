@@ -16,8 +16,6 @@ enum { SLOTS = 64 };
 enum { LEAST_HITS = 5 };
 /* directions of a track: more than any run has, and no overflow */
 static const int64_t MOST_SEEN = INT64_C(1) << 53;
-/* time that a saved state may have: SGP4 steps to it by 720 minutes */
-static const double LONGEST_S = 1e10;
 
 /* A track that has not ended. */
 typedef struct slot {
@@ -110,13 +108,14 @@ static bst_status archive_slot(const bst_run_arcs *a, slot *s, bst_archive *arch
     s->arc.count = bst_archive_count(archive, s->arc.count, BST_CUSTODY_DIRECTIONS);
     s->seen = bst_archive_integer(archive, s->seen, 0, MOST_SEEN);
     s->every = bst_archive_integer(archive, s->every, 1, MOST_SEEN);
-    s->tick = bst_archive_integer(archive, s->tick, 0, (int64_t)(LONGEST_S * a->tick_rate_hz));
+    s->tick =
+        bst_archive_integer(archive, s->tick, 0, (int64_t)(BST_OD_LONGEST_S * a->tick_rate_hz));
     for (int i = 0; i < s->arc.count; i++) {
         const double time_s = s->arc.directions[i].observer.time_s;
-        if (!(time_s >= 0.0 && time_s <= LONGEST_S)) {
+        if (!(time_s >= 0.0 && time_s <= BST_OD_LONGEST_S)) {
             return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
                             "the saved state has a direction at %g s (allowed: 0 to %g)", time_s,
-                            LONGEST_S);
+                            BST_OD_LONGEST_S);
         }
     }
     return BST_OK;

@@ -10,7 +10,7 @@
 
 /* Tracks are linked within a day. */
 static const double WITHIN_S = BST_DAY_S;
-/* tracks that confirm a candidate: two that do not belong together fit an orbit more easily */
+/* tracks that confirm a candidate: two of different objects may fit one orbit by chance */
 enum { CONFIRMED = 3 };
 /* half the radius of a sphere of 1 m^2 per quarter of its cross-section, as in run_custody.c, m */
 static const double UNKNOWN_PHOTOCENTRE_M = 0.5;
@@ -174,10 +174,11 @@ bst_candidate_figures bst_run_candidates_figures(const bst_run_candidates *c) {
     return c->figures;
 }
 
-bst_status bst_run_candidates_archive(bst_run_candidates *c, bst_archive *archive) {
+bst_status bst_run_candidates_archive(bst_run_candidates *c, int world_objects,
+                                      bst_archive *archive) {
     BST_TRY(bst_od_linker_archive(&c->linker, archive));
-    BST_ARCHIVE(archive, c->object);
-    for (int i = 0; i < BST_OD_LINK_ORBITS; i++) {
+    for (int i = 0; i < c->linker.count; i++) {
+        c->object[i] = (int32_t)bst_archive_integer(archive, c->object[i], -1, world_objects - 1);
         bst_archive_bool(archive, &c->mixed[i]);
     }
     BST_ARCHIVE(archive, c->figures);

@@ -28,8 +28,8 @@ void bst_run_candidates_free(bst_run_candidates *candidates); /* NULL allowed */
  * Given:     true_object  that it belongs to; -1: none
  * Returned:  *made        the new object if the candidate has three tracks or more, and an orbit
  *                         that they determine (batch least squares with a factor on the variances;
- *                         bst_od_solution.bend below 1); the candidate is then removed. Its id and
- *                         noise are 0. updates 0: none */
+ *                         bst_od_solution.bend below 1); the candidate is then removed. Its
+ *                         noise is 0. updates 0: none */
 bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *candidates, int sensor,
                                    const bst_run_arc *arc, int true_object,
                                    bst_run_new_object *made) BST_MUST_CHECK;
@@ -37,8 +37,9 @@ bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *candidates,
 /* Figures so far. */
 bst_candidate_figures bst_run_candidates_figures(const bst_run_candidates *candidates);
 
-/* Saves or restores arcs, orbits and figures. Errors: BST_ERR_FORMAT */
-bst_status bst_run_candidates_archive(bst_run_candidates *candidates,
+/* Saves or restores arcs, orbits and figures. Errors: BST_ERR_FORMAT, also for an object of the
+ * truth that the world lacks */
+bst_status bst_run_candidates_archive(bst_run_candidates *candidates, int world_objects,
                                       bst_archive *archive) BST_MUST_CHECK;
 
 #endif

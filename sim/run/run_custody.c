@@ -35,7 +35,9 @@ enum { IDENTITY = 10 };
 /* Score of an object. */
 typedef struct score {
     int64_t updates, cross_tags;
-    double last_s, chi2_sum;
+    double last_s;
+    double chi2_sum; /* of the tracks that updated it themselves, not of those of a new orbit */
+    int64_t chi2_count;
 } score;
 
 struct bst_run_custody {
@@ -221,7 +223,7 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
         archive_object(c, i, archive);
     }
     BST_TRY(bst_run_arcs_archive(c->arcs, archive));
-    BST_TRY(bst_run_candidates_archive(c->candidates, archive));
+    BST_TRY(bst_run_candidates_archive(c->candidates, c->object_count, archive));
     BST_TRY(bst_run_new_objects_archive(&c->new_objects, c->object_count, archive));
     BST_ARCHIVE(archive, c->figures);
     return BST_OK;
@@ -349,16 +351,19 @@ static bool update(const bst_custody_orbit *orbit, const bst_run_arc *arc,
 }
 
 /* Whether a catalogued object's orbit is that of a new one. */
-static bool is_object(const bst_run_custody *c, int object, const bst_run_new_object *o,
-                      double time_s) {
+static bool is_object(bst_run_custody *c, int object, const bst_run_new_object *o, double time_s) {
     double chi2;
-    return c->orbits[object].a_m > 0.0 &&
-           bst_run_new_object_is(&c->orbits[object], &c->filters[object], &o->orbit, &o->filter,
+    if (!(c->orbits[object].a_m > 0.0)) {
+        return false;
+    }
+    bst_custody_add_process_noise(&c->config, time_s, &c->filters[object]);
+    return bst_run_new_object_is(&c->orbits[object], &c->filters[object], &o->orbit, &o->filter,
                                  time_s, &chi2);
 }
 
-/* Adds a new object. If its orbit is that of exactly one object that is known, that one starts anew
- * on it instead. */
+/* Adds a new object. If its orbit is that of one object that is known, it is not added: a
+ * catalogued one starts anew on it, an earlier new one keeps its own. Nor is it if it is that of
+ * several: which one it is stays open, but it is no further one. */
 static bst_status add_new_object(bst_ctx *ctx, bst_run_custody *c, const bst_run_new_object *o) {
     const double time_s = -o->orbit.epoch_offset_s;
     int found = 0, which = -1;
@@ -368,27 +373,24 @@ static bst_status add_new_object(bst_ctx *ctx, bst_run_custody *c, const bst_run
         which = same ? i : which;
     }
     for (int i = 0; i < c->new_objects.count; i++) {
-        const bst_run_new_object *own = &c->new_objects.items[i];
+        bst_run_new_object *own = &c->new_objects.items[i];
         double chi2;
+        bst_run_new_object_advance(own, time_s);
         bool same =
             bst_run_new_object_is(&own->orbit, &own->filter, &o->orbit, &o->filter, time_s, &chi2);
         found += same;
         which = same ? c->object_count + i : which;
     }
-    if (found != 1) {
+    if (found == 0) {
         return bst_run_new_objects_add(ctx, &c->new_objects, o);
     }
-    c->figures.new_matched++;
-    if (which >= c->object_count) {
-        bst_run_new_object *own = &c->new_objects.items[which - c->object_count];
-        own->updates += o->updates;
-        own->cross_tags += own->true_object == o->true_object ? 0 : o->updates;
-        own->last_s = fmax(own->last_s, o->last_s);
-        return BST_OK;
-    }
     bst_custody_filter anew;
-    if (bst_run_new_object_carry(&o->orbit, &o->filter, &c->orbits[which], time_s, &anew)) {
+    if (found == 1 && which >= c->object_count) {
+        c->figures.new_matched++;
+    } else if (found == 1 &&
+               bst_run_new_object_carry(&o->orbit, &o->filter, &c->orbits[which], time_s, &anew)) {
         score *s = &c->scores[which];
+        c->figures.new_matched++;
         c->filters[which] = anew;
         s->updates += o->updates;
         s->cross_tags += o->true_object == which ? 0 : o->updates;
@@ -417,6 +419,7 @@ static double note_update(bst_run_custody *c, const match *m, double time_s) {
     s->updates++;
     s->cross_tags += crossed;
     s->chi2_sum += m->chi2;
+    s->chi2_count++;
     s->last_s = isnan(s->last_s) ? time_s : fmax(s->last_s, time_s);
     return bst_custody_nees(&c->filters[m->best]);
 }
@@ -431,7 +434,10 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     const int new_one = m.best - c->object_count; /* index of it; below 0: catalogued */
     /* an image of two objects is that of neither, and may be in no one's gate */
     bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN && m.close == 0;
-    bool blended = m.best < 0 && m.close > 0;
+    const bool blended = m.best < 0 && m.close > 0;
+    /* One object beside an arc may be in its image, or may be elsewhere than a filter that is too
+     * sure says: only tracks that make a new orbit tell. */
+    const bool unknown = m.best < 0 && m.close < 2;
     bool updated = clear && (new_one < 0 ? update(&c->orbits[m.best], arc, &c->filters[m.best])
                                          : update(&c->new_objects.items[new_one].orbit, arc,
                                                   &c->new_objects.items[new_one].filter));
@@ -440,7 +446,7 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     f->ambiguous += (m.best >= 0 && !clear) || blended;
     f->uncorrelated += (m.best < 0 && !blended) || (clear && !updated);
     const double nees = updated ? note_update(c, &m, z->observer.time_s) : NAN;
-    if (m.best < 0 && !blended) {
+    if (unknown) {
         bst_run_new_object made;
         BST_TRY(bst_run_candidates_take(ctx, c->candidates, sensor, arc, m.true_object, &made));
         if (made.updates > 0) {
@@ -504,7 +510,7 @@ static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, doubl
         bst_custody_number(*sigma_m),
         bst_custody_number(error_m),
         bst_custody_number(*nees),
-        bst_custody_number(s->updates > 0 ? s->chi2_sum / (double)s->updates : NAN),
+        bst_custody_number(s->chi2_count > 0 ? s->chi2_sum / (double)s->chi2_count : NAN),
         bst_custody_whole_number(object, true)};
     return bst_io_table_append(ctx, c->objects, row);
 }
@@ -543,16 +549,12 @@ bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s
         }
     }
     bst_run_new_figures new_ones;
-    BST_TRY(
-        bst_run_new_objects_finish(ctx, &c->new_objects, c->world, c->objects, end_s, &new_ones));
+    BST_TRY(bst_run_new_objects_finish(ctx, &c->new_objects, c->world, c->orbits, c->objects, end_s,
+                                       &new_ones));
     f->new_objects = c->new_objects.count;
     f->new_wrong = new_ones.wrong;
     f->new_sigma_median_m = new_ones.sigma_median_m;
     f->new_nees_mean = new_ones.nees_mean;
-    for (int i = 0; i < c->new_objects.count; i++) {
-        const int64_t object = c->new_objects.items[i].true_object;
-        f->new_wrong += object >= 0 && c->orbits[object].a_m > 0.0; /* it was catalogued */
-    }
     f->objects = count;
     f->age_mean_s = updated_count > 0 ? age_sum / updated_count : NAN;
     f->sigma_median_m = bst_custody_quantile(sigmas, count, 0.5);

@@ -29,7 +29,8 @@ typedef struct bst_custody_figures {
     int64_t candidates, candidates_confirmed, candidates_wrong; /* bst_candidate_figures */
     /* orbits of candidates that became objects; tracks that updated them after that, which are
      * correlated ones too; new objects of tracks of different objects or of none, or of an object
-     * that is known; candidates whose orbit was that of a known object, and updated it */
+     * that is known; candidates whose orbit was that of one known object: a catalogued one took it
+     */
     int64_t new_objects, new_tracks, new_wrong, new_matched;
     double new_sigma_median_m, new_nees_mean; /* at the end; NAN: none */
     int64_t cross_tags;                 /* correlated with another object than that of the truth */

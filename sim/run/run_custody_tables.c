@@ -31,7 +31,9 @@ static const bst_io_column object_columns[] = {
     REAL("sigma_m", "m", "standard deviation of the position at the end"),
     REAL("error_m", "m", "error of the position at the end"),
     REAL("nees", "", "error of the elements squared, by their covariance, 6 degrees of freedom"),
-    REAL("chi2_mean", "", "mean of the tracks' chi-square, 4 degrees of freedom each"),
+    REAL("chi2_mean", "",
+         "mean chi-square of the tracks that updated it themselves, 4 degrees of freedom; NULL: "
+         "none"),
     INT("true_object", "", "id in truth; NULL: new object of different ones, or of none"),
 };
 

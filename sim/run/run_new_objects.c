@@ -36,7 +36,6 @@ bst_status bst_run_new_objects_add(bst_ctx *ctx, bst_run_new_objects *n,
     BST_TRY(make_room(ctx, n, n->count + 1));
     bst_run_new_object *own = &n->items[n->count++];
     memcpy(own, object, sizeof *own); /* all bytes are in a saved state */
-    own->id = n->count;
     own->noise_m_per_day = bst_custody_drag_noise_m_per_day(&own->orbit);
     return BST_OK;
 }
@@ -125,11 +124,11 @@ static void score_object(bst_run_new_object *o, const bst_world *world, double t
     }
 }
 
-/* Whether a new object is of tracks of different objects or of none, or a second one of its object.
- */
-static bool is_wrong(const bst_run_new_objects *n, int index) {
+/* Whether a new object is of tracks of different objects or of none, of a catalogued one, or a
+ * second one of its object. */
+static bool is_wrong(const bst_run_new_objects *n, const bst_custody_orbit *catalogue, int index) {
     const int64_t object = n->items[index].true_object;
-    bool wrong = object < 0;
+    bool wrong = object < 0 || catalogue[object].a_m > 0.0;
     for (int i = 0; i < index && !wrong; i++) {
         wrong = n->items[i].true_object == object;
     }
@@ -137,7 +136,8 @@ static bool is_wrong(const bst_run_new_objects *n, int index) {
 }
 
 bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *n, const bst_world *world,
-                                      bst_io_table *table, double end_s, bst_run_new_figures *out) {
+                                      const bst_custody_orbit *catalogue, bst_io_table *table,
+                                      double end_s, bst_run_new_figures *out) {
     double *sigmas = calloc((size_t)n->count + 1, sizeof *sigmas), nees_sum = 0.0;
     int known = 0, nees_count = 0;
     bst_status status =
@@ -148,7 +148,7 @@ bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *n, cons
         double sigma, error, nees;
         char name[32];
         score_object(o, world, end_s, &sigma, &error, &nees);
-        out->wrong += is_wrong(n, i);
+        out->wrong += is_wrong(n, catalogue, i);
         nees_sum += isnan(nees) ? 0.0 : nees;
         nees_count += !isnan(nees);
         if (!isnan(sigma)) {
@@ -176,6 +176,13 @@ bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *n, cons
     return status;
 }
 
+/* Whether a restored object has an orbit and times that a run may have. */
+static bool is_possible(const bst_run_new_object *o) {
+    const double e = o->orbit.elements.eccentricity;
+    return fabs(o->orbit.epoch_offset_s) <= BST_OD_LONGEST_S && o->orbit.a_m > 0.0 && e >= 0.0 &&
+           e < 1.0 && isfinite(o->filter.noise_until_s) && isfinite(o->last_s);
+}
+
 bst_status bst_run_new_objects_archive(bst_run_new_objects *n, int world_objects,
                                        bst_archive *archive) {
     n->count = bst_archive_count(archive, n->count, MOST_OBJECTS);
@@ -183,6 +190,15 @@ bst_status bst_run_new_objects_archive(bst_run_new_objects *n, int world_objects
     for (int i = 0; i < n->count; i++) {
         bst_run_new_object *o = &n->items[i];
         BST_ARCHIVE(archive, *o);
+        if (!is_possible(o)) {
+            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                            "the saved state has new object %d on no ellipse (semi-major axis %g "
+                            "m, eccentricity %g), or with times that no run has (elements %g s "
+                            "before the epoch, allowed are %g; noise until %g s, updated at %g s)",
+                            i + 1, o->orbit.a_m, o->orbit.elements.eccentricity,
+                            o->orbit.epoch_offset_s, BST_OD_LONGEST_S, o->filter.noise_until_s,
+                            o->last_s);
+        }
         o->true_object = bst_archive_integer(archive, o->true_object, -1, world_objects - 1);
     }
     return BST_OK;

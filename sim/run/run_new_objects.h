@@ -11,7 +11,6 @@ typedef struct bst_run_new_object {
     bst_custody_orbit orbit;
     bst_custody_filter filter;
     double noise_m_per_day;      /* of its process noise, for its unknown drag */
-    int64_t id;                  /* 1, 2, ... */
     int64_t updates, cross_tags; /* tracks, with those of its candidate; of another object */
     double last_s;               /* last of them */
     double chi2_sum;             /* of the tracks since then */
@@ -27,12 +26,13 @@ typedef struct bst_run_new_objects {
 
 /* Score of the new objects at the end of a run. */
 typedef struct bst_run_new_figures {
-    int64_t wrong;         /* of tracks of different objects or of none, or a second one */
+    int64_t wrong;         /* of tracks of different objects or none, or of a known object */
     double sigma_median_m; /* of the position; NAN: none */
     double nees_mean;      /* of their osculating elements, 6 degrees of freedom; NAN: none */
 } bst_run_new_figures;
 
-/* Appends an object, and gives it its id and process noise. Errors: BST_ERR_MEMORY */
+/* Appends an object, and gives it its process noise; beyond 65,536 objects it is left out. Errors:
+ * BST_ERR_MEMORY */
 bst_status bst_run_new_objects_add(bst_ctx *ctx, bst_run_new_objects *objects,
                                    const bst_run_new_object *object) BST_MUST_CHECK;
 /* Frees the objects; none are left. */
@@ -58,13 +58,15 @@ bool bst_run_new_object_carry(const bst_custody_orbit *from, const bst_custody_f
                               const bst_custody_orbit *to, double time_s, bst_custody_filter *out);
 
 /* Scores the new objects against the truth at the end, and writes their rows to the table custody
- * (NULL: no rows). Errors: BST_ERR_MEMORY, those of bst_io_table_append */
+ * (NULL: no rows). catalogue: orbit of each object of the world, a_m 0: it has none there. Errors:
+ * BST_ERR_MEMORY, those of bst_io_table_append */
 bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *objects,
-                                      const bst_world *world, bst_io_table *table, double end_s,
+                                      const bst_world *world, const bst_custody_orbit *catalogue,
+                                      bst_io_table *table, double end_s,
                                       bst_run_new_figures *out) BST_MUST_CHECK;
 
-/* Saves or restores the objects. Errors: BST_ERR_MEMORY; BST_ERR_FORMAT: their number, or an object
- * of the truth that the world lacks */
+/* Saves or restores the objects. Errors: BST_ERR_MEMORY; BST_ERR_FORMAT: their number, orbit or
+ * times are impossible, or an object of the truth that the world lacks */
 bst_status bst_run_new_objects_archive(bst_run_new_objects *objects, int world_objects,
                                        bst_archive *archive) BST_MUST_CHECK;
 

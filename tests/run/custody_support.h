@@ -23,8 +23,8 @@ bool __wrap_bst_custody_update(const bst_custody_orbit *orbit, const bst_custody
     return !updates_fail && __real_bst_custody_update(orbit, z, filter);
 }
 
-/* What observations of an object, by its number, are predicted to be, in place of a prediction; and
- * the photocentres of all objects. */
+/* What observations of an object, by its number (below 0: of all), are predicted to be, in place of
+ * a prediction; and the photocentres of all objects. */
 static const bst_custody_prediction *predicted;
 static int lost_norad = 44802;
 static double photocentres_m[8];
@@ -34,7 +34,7 @@ bool __real_bst_custody_predict(const bst_custody_orbit *orbit, const bst_custod
                                 const bst_custody_observation *z, bst_custody_prediction *out);
 bool __wrap_bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                                 const bst_custody_observation *z, bst_custody_prediction *out) {
-    if (predicted && orbit->elements.norad == lost_norad) {
+    if (predicted && (orbit->elements.norad == lost_norad || lost_norad < 0)) {
         *out = *predicted;
         return true;
     }

@@ -303,6 +303,54 @@ static void neighbours_by_their_uncertainty(void **state) {
     scratch_remove(&place);
 }
 
+/* What becomes of three tracks of A, all known objects being predicted `off_rad` beside them and
+ * outside of the gate. */
+static bst_custody_figures figures_beside(const bst_world *world, double off_rad) {
+    bst_ctx ctx = {0};
+    bst_run_custody *c;
+    bst_custody_figures f;
+    const int own[6] = {0, 0, 0, 0, 0, 0};
+    const bst_custody_prediction far = {.innovation = {off_rad, 0.0}, .chi2 = 1e3};
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
+    predicted = &far;
+    lost_norad = -1;
+    for (int k = 0; k < 3; k++) {
+        take_detected(&ctx, c, world, own, k + 1, 100.0 + 6900.0 * k);
+    }
+    predicted = NULL;
+    lost_norad = 44802;
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 25000.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    bst_run_custody_free(c);
+    return f;
+}
+
+/* Tracks that no filter explains, with an orbit that is that of two known objects, make no third
+ * one; those beside both, whose light may be that of both, are no candidates at all. */
+static void an_orbit_of_two_objects_is_no_third(void **state) {
+    (void)state;
+    scratch place;
+    scratch_make(&place);
+    bst_world *world = world_with_neighbour(&place, "191.6451"); /* 0.7 km beside A */
+    bst_custody_figures f = figures_beside(world, 1.0);
+    assert_true(f.uncorrelated == 3 && f.candidates_confirmed == 1);
+    assert_true(f.new_objects == 0 && f.new_matched == 0 && f.updated == 0);
+    f = figures_beside(world, 1e-7);
+    assert_true(f.uncorrelated == 0 && f.ambiguous == 3 && f.candidates == 0 && f.updated == 0);
+    bst_world_free(world);
+    scratch_remove(&place);
+}
+
+/* A filter that is too sure, so that the tracks of its object are beside it, gets it back. */
+static void a_filter_gets_its_object_back(void **state) {
+    (void)state;
+    bst_world *world = test_world_with("{\"name\": \"A\", " TEST_GX5 "}", "");
+    const bst_custody_figures f = figures_beside(world, 1e-7);
+    assert_true(f.uncorrelated == 0 && f.ambiguous == 3 && f.candidates_confirmed == 1);
+    assert_true(f.new_objects == 0 && f.new_matched == 1 && f.updated == 1);
+    bst_world_free(world);
+}
+
 /* A track with detections updates its object with their directions, not with its state; one whose
  * detections are of two objects updates none. */
 static void directions_update_their_object(void **state) {
@@ -364,6 +412,8 @@ int main(void) {
         cmocka_unit_test(a_failed_update_is_counted),
         cmocka_unit_test(neighbours_are_ambiguous),
         cmocka_unit_test(neighbours_by_their_uncertainty),
+        cmocka_unit_test(an_orbit_of_two_objects_is_no_third),
+        cmocka_unit_test(a_filter_gets_its_object_back),
         cmocka_unit_test(directions_update_their_object),
         cmocka_unit_test(off_and_without_objects),
     };

@@ -1,4 +1,7 @@
 /* Tracks without an object in a run: candidates, new objects, matches with the catalogue. */
+#include "sim/run/run_candidates.h"
+#include "sim/run/run_new_objects.h"
+#include "tests/archive_support.h"
 #include "tests/run/custody_support.h"
 
 /* Tracks of an object that the catalogue lacks become a candidate: two of one object are linked,
@@ -91,11 +94,16 @@ static void new_objects_match_the_catalogue(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_world *world = world_of_two();
+    scratch place;
+    bst_run *store;
+    bst_run_reader *run;
     bst_run_custody *c;
     bst_custody_figures f;
     const int own[6] = {0, 0, 0, 0, 0, 0};
     const bst_custody_prediction far = {.innovation = {1.0, 1.0}, .chi2 = 1e3};
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
+    scratch_make(&place);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), store, &c));
     predicted = &far;
     lost_norad = 44801;
     for (int k = 0; k < 3; k++) {
@@ -109,7 +117,147 @@ static void new_objects_match_the_catalogue(void **state) {
     assert_true(f.updated == 1 && f.cross_tags == 0);
     assert_true(f.nees_mean > 0.0 && f.nees_mean < 6.0); /* directions without errors */
     bst_run_custody_free(c);
+    bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_reader_open(&ctx, scratch_path(&place, "run"), &run));
+    /* none of the three tracks has a chi-square of this filter */
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody WHERE object = 0 AND updates "
+                                        "= 3 AND chi2_mean IS NULL",
+                                        0, 0),
+                     1);
+    bst_run_reader_close(run);
     bst_world_free(world);
+    scratch_remove(&place);
+}
+
+/* An object of tracks that the filters do not explain, though the first new one has its orbit
+ * already: that one keeps it, and what it was updated by. */
+static void earlier_new_objects_keep_their_orbit(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch place;
+    bst_run *store;
+    bst_run_reader *run;
+    bst_custody_figures f;
+    bst_world *world = world_of_two();
+    const int unknown[6] = {0, 0, 0, 0, 0, 0};
+    const bst_custody_prediction far = {.innovation = {1.0, 1.0}, .chi2 = 1e3};
+    scratch_make(&place);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
+    bst_run_custody *c = without_a(&ctx, world, store);
+    predicted = &far;
+    lost_norad = -1;
+    for (int k = 0; k < 6; k++) { /* soon: the place must be known within 5 km */
+        take_detected(&ctx, c, world, unknown, k + 1,
+                      k < 3 ? 100.0 + 9900.0 * k : 6000.0 * k + 2500.0);
+    }
+    predicted = NULL;
+    lost_norad = 44802;
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 40000.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.uncorrelated == 6 && f.new_objects == 1 && f.new_matched == 1);
+    bst_run_custody_free(c);
+    bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_reader_open(&ctx, scratch_path(&place, "run"), &run));
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody WHERE name = 'new 1' AND "
+                                        "updates = 3 AND last_s < 20000",
+                                        0, 0),
+                     1);
+    bst_run_reader_close(run);
+    bst_world_free(world);
+    scratch_remove(&place);
+}
+
+/* A new object is wrong once, whatever makes it so: of none, of a catalogued one, a second one. */
+static void wrong_objects_are_counted_once(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_new_objects n = {.count = 0};
+    bst_run_new_figures f;
+    const bst_custody_orbit catalogue[3] = {{.a_m = 4.2e7}, {.a_m = 0.0}, {.a_m = 0.0}};
+    const int objects[] = {0, 0, 1, 2, 2, -1}, wrong[] = {1, 2, 2, 2, 3, 4};
+    for (int i = 0; i < 6; i++) {
+        const bst_run_new_object o = {.true_object = objects[i]};
+        bst_assert_ok(&ctx, bst_run_new_objects_add(&ctx, &n, &o));
+        bst_assert_ok(&ctx, bst_run_new_objects_finish(&ctx, &n, world, catalogue, NULL, 10.0, &f));
+        assert_int_equal(f.wrong, wrong[i]);
+    }
+    bst_run_new_objects_clear(&n);
+    bst_world_free(world);
+}
+
+/* Candidates or new objects of a world with so many objects. */
+typedef struct saved {
+    bst_run_candidates *candidates;
+    bst_run_new_objects *objects;
+    int world_objects;
+} saved;
+
+static bst_status archive_saved(void *self, bst_archive *archive) {
+    saved *s = self;
+    return s->candidates ? bst_run_candidates_archive(s->candidates, s->world_objects, archive)
+                         : bst_run_new_objects_archive(s->objects, s->world_objects, archive);
+}
+
+/* An object of the truth in a saved state is one of the world. */
+static void saved_candidates_are_of_the_world(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_candidates *c;
+    bst_run_new_object made;
+    const bst_run_arc arc = {.id = 1, .hits = 9, .count = BST_OD_LEAST};
+    bst_assert_ok(&ctx, bst_run_candidates_create(&ctx, world, NULL, &c));
+    bst_assert_ok(&ctx, bst_run_candidates_take(&ctx, c, 0, &arc, 2, &made));
+    saved self = {.candidates = c, .world_objects = 3};
+    test_saved bytes = test_save(archive_saved, &self);
+    bst_assert_ok(&ctx, test_restore(&ctx, archive_saved, &self, bytes));
+    self.world_objects = 2;
+    assert_int_equal(test_restore(&ctx, archive_saved, &self, bytes), BST_ERR_FORMAT);
+    free(bytes.bytes);
+    bst_run_candidates_free(c);
+    bst_world_free(world);
+}
+
+/* A saved orbit that is no ellipse, or with a time that SGP4 would step to for ever, is an error.
+ */
+static void saved_orbits_are_possible(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_run_new_object good = {
+        .orbit = {.elements = {.mean_motion_radpmin = 0.0044}, .a_m = 4.2e7}, .true_object = -1};
+    const double hostile[][5] = {/* epoch, a, e, noise until, last */
+                                 {1e300, 4.2e7, 0.0, 0.0, 0.0},  {NAN, 4.2e7, 0.0, 0.0, 0.0},
+                                 {0.0, 0.0, 0.0, 0.0, 0.0},      {0.0, NAN, 0.0, 0.0, 0.0},
+                                 {0.0, 4.2e7, -0.1, 0.0, 0.0},   {0.0, 4.2e7, 1.0, 0.0, 0.0},
+                                 {0.0, 4.2e7, 0.0, 0.0, NAN},    {0.0, 4.2e7, 0.0, NAN, 0.0},
+                                 {0.0, 4.2e7, 0.0, -INFINITY, 0}};
+    bst_run_new_objects n = {.count = 0};
+    saved self = {.objects = &n, .world_objects = 1};
+    bst_assert_ok(&ctx, bst_run_new_objects_add(&ctx, &n, &good));
+    test_saved bytes = test_save(archive_saved, &self);
+    bst_assert_ok(&ctx, test_restore(&ctx, archive_saved, &self, bytes));
+    free(bytes.bytes);
+    for (size_t i = 0; i < sizeof hostile / sizeof *hostile; i++) {
+        bst_run_new_object *o = &n.items[0];
+        bst_archive *damaged;
+        memcpy(o, &good, sizeof good);
+        o->orbit.epoch_offset_s = hostile[i][0];
+        o->orbit.a_m = hostile[i][1];
+        o->orbit.elements.eccentricity = hostile[i][2];
+        o->filter.noise_until_s = hostile[i][3];
+        o->last_s = hostile[i][4];
+        bst_assert_ok(&ctx, bst_archive_create(&ctx, &damaged));
+        bst_assert_ok(&ctx, bst_archive_begin(&ctx, damaged, "it"));
+        assert_int_equal(archive_saved(&self, damaged), BST_ERR_FORMAT);
+        assert_non_null(strstr(ctx.message, "new object 1"));
+        bst_archive_free(damaged);
+    }
+    bst_run_new_objects_clear(&n);
 }
 
 int main(void) {
@@ -117,6 +265,10 @@ int main(void) {
         cmocka_unit_test(unknown_objects_become_candidates),
         cmocka_unit_test(candidates_become_objects),
         cmocka_unit_test(new_objects_match_the_catalogue),
+        cmocka_unit_test(earlier_new_objects_keep_their_orbit),
+        cmocka_unit_test(wrong_objects_are_counted_once),
+        cmocka_unit_test(saved_candidates_are_of_the_world),
+        cmocka_unit_test(saved_orbits_are_possible),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* Filters of catalogued orbits: on objects of the shipped catalogue, with observations that are
  * drawn about their true directions. */
+#include "sim/astro/sgp4.h"
 #include "tracker/orbit/custody.h"
 
 #include <math.h>
@@ -481,8 +482,33 @@ static void refuses_what_is_no_ellipse(void **state) {
     assert_non_null(strstr(ctx.message, "eccentricities from 0 to below 1"));
 }
 
+/* Where SGP4 is not smooth in its elements, the catalogued ones give the catalogued place: without
+ * an eccentricity the line of apsides is nowhere, but Sun and Moon act along it. */
+static void circular_orbits_keep_their_apsides(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    for (int k = 0; k < 4; k++) {
+        const bst_elements set = {.epoch_utc_jd1 = 2459746.5,
+                                  .inclination_rad = 55.0 * BST_DEG_RAD,
+                                  .eccentricity = k == 3 ? 9e-4 : 0.0,
+                                  .arg_perigee_rad = 2.0 * k,
+                                  .mean_anomaly_rad = 1.0,
+                                  .mean_motion_radpmin = 2.0 * BST_PI / 718.0};
+        bst_custody_orbit orbit;
+        bst_sgp4 *sgp4;
+        bst_vec3 r, v, place;
+        bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 3600.0, 0.0, &orbit));
+        bst_assert_ok(&ctx, bst_sgp4_create(&ctx, &set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4));
+        assert_true(bst_sgp4_motion(sgp4, 70.0, &r, &v));
+        bst_sgp4_free(sgp4);
+        assert_true(bst_custody_catalogued_position(&orbit, 600.0, &place));
+        assert_true(bst_vec3_norm(bst_vec3_sub(place, r)) < 1e-3); /* 80 m otherwise */
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(circular_orbits_keep_their_apsides),
         cmocka_unit_test(errors_agree_with_covariances),
         cmocka_unit_test(directions_and_strong_drag),
         cmocka_unit_test(arcs_scale_their_errors),

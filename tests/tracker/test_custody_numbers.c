@@ -9,7 +9,7 @@
 #include "tracker/orbit/arc_outliers.h"
 #include "tracker/orbit/custody.h"
 
-enum { N = BST_CUSTODY_STATE, MOST = 6 };
+enum { N = BST_CUSTODY_STATE, MOST = 6, COUNT = 3 };
 #define DAY_S 86400.0
 
 static const double photocentre_m = 4.0;
@@ -339,8 +339,6 @@ static void one_observation(void **state) {
     }
 }
 
-enum { COUNT = 3 };
-
 /* A pass of three directions with errors of their own and errors that they share, which change
  * between them by unequal amounts, as the photocentre's do by the angles of orbit and direction. */
 typedef struct pass {
@@ -352,9 +350,9 @@ typedef struct pass {
 
 /* *out: all directions are off by `off_rad` along their first axes beside errors of their own. */
 static void make_pass(double off_rad, pass *out) {
-    static const double change[COUNT] = {9.0, 0.3, 0.8}, at_s[COUNT] = {0.0, 25.0, 90.0};
+    static const double change[COUNT] = {9.0, 0.3, 0.8}, at_s[COUNT] = {0.0, 60.0, 240.0};
     bst_ctx ctx = {0};
-    const bst_elements set = orbit_of(68.0, 0.02, 1.6);
+    const bst_elements set = orbit_of(68.0, 0.6, 6.0);
     const double offset_s = -20000.0;
     const bst_od_observer eye = observer_near(&set, offset_s);
     *out = (pass){.filter = {.x = {40.0, -25.0, 18.0, 30.0, -22.0, 35.0}}};
@@ -387,6 +385,8 @@ static void make_pass(double off_rad, pass *out) {
 
 /* Covariance of the directions' errors; `factor` multiplies all but the photocentre's part. */
 static void errors_of(const pass *t, double factor, double r[MOST][MOST]) {
+    const double near = 1.0 - t->orbit.elements.eccentricity, root = sqrt((2.0 - near) / near);
+    const double perigee = t->orbit.elements.mean_motion_radpmin / 60.0 * root / near;
     for (int i = 0; i < COUNT; i++) {
         double kept = 1.0; /* of what directions share */
         for (int k = i; k < COUNT; k++) {
@@ -395,8 +395,7 @@ static void errors_of(const pass *t, double factor, double r[MOST][MOST]) {
             const bst_vec3 ea[2] = {a.e1, a.e2}, eb[2] = {b.e1, b.e2};
             const double own[2][2] = {{u->cov_11, u->cov_12}, {u->cov_12, u->cov_22}};
             kept *= k > i ? exp(-v->shared_change) : 1.0;
-            const double minutes = (v->observer.time_s - u->observer.time_s) / 60.0;
-            const double round = t->orbit.elements.mean_motion_radpmin * minutes;
+            const double round = perigee * (v->observer.time_s - u->observer.time_s);
             const double turn = 2.0 * sin(0.5 * bst_vec3_angle(u->direction, v->direction));
             const double displaced = photocentre_m * photocentre_m / t->range_m[i] / t->range_m[k] *
                                      exp(-0.5 * (round * round + turn * turn));

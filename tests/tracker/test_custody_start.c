@@ -71,12 +71,12 @@ static void errors_agree_with_covariances(void **state) {
         }
         bst_assert_close(orbit.photocentre_m, 0.5, 0.0);
         used++;
-        flat += set.inclination_rad < BST_CUSTODY_LEAST_INCLINATION_RAD;
+        flat += bst_custody_osculates(&set);
         now += bst_custody_nees(&d[0]);
         later += bst_custody_nees(&d[1]);
     }
     free(sets);
-    print_message("%d objects, %d near the equator: NEES %.2f, later %.2f\n", used, flat,
+    print_message("%d objects, %d by osculating elements: NEES %.2f, later %.2f\n", used, flat,
                   now / used, later / used);
     assert_true(used > 200 && flat > 10);
     /* means of chi-squares of 6 degrees of freedom, within 4 standard deviations */

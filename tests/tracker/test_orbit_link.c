@@ -162,6 +162,20 @@ static void a_linker_is_saved_and_restored(void **state) {
     bst_assert_ok(&ctx, bst_archive_begin(&ctx, damaged, "it"));
     assert_int_equal(bst_od_linker_archive(&l, damaged), BST_ERR_FORMAT);
     bst_archive_free(damaged);
+    /* times that a propagator would step to for ever */
+    l.items[1].count = DIRECTIONS;
+    double *const times[] = {&l.items[1].directions[DIRECTIONS - 1].observer.time_s,
+                             &l.items[1].state.time_s};
+    const double hostile[] = {1e300, -1e300, NAN};
+    for (int i = 0; i < 6; i++) {
+        const double before = *times[i / 3];
+        *times[i / 3] = hostile[i % 3];
+        bst_assert_ok(&ctx, bst_archive_create(&ctx, &damaged));
+        bst_assert_ok(&ctx, bst_archive_begin(&ctx, damaged, "it"));
+        assert_int_equal(bst_od_linker_archive(&l, damaged), BST_ERR_FORMAT);
+        bst_archive_free(damaged);
+        *times[i / 3] = before;
+    }
 }
 
 int main(void) {

@@ -73,10 +73,11 @@ static void ellipse_state(const bst_elements *set, bst_vec3 *r, bst_vec3 *v) {
     *v = bst_vec3_axpy(bst_vec3_scale(p, -rate * s), rate * root * c, q);
 }
 
-/* Motion of an orbit near the equator: the catalogued one, whose osculating elements differ by x.
- * What perturbations do to the difference, a thousandth of it in a revolution, is left out. */
-static bool near_equator_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_vec3 cat_v,
-                                const double x[N], double time_s, bst_vec3 *r, bst_vec3 *v) {
+/* Motion of an orbit near the equator or circular: the catalogued one, whose osculating elements
+ * differ by x. What perturbations do to the difference, a thousandth of it in a revolution, is left
+ * out. */
+static bool osculating_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_vec3 cat_v,
+                              const double x[N], double time_s, bst_vec3 *r, bst_vec3 *v) {
     const bst_astro_kepler_elements k =
         bst_astro_kepler_elements_of(BST_EARTH_MU_M3PS2, cat_r, cat_v);
     if (!(k.semi_major_axis_m > 0.0)) {
@@ -104,10 +105,10 @@ static bool near_equator_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_
  * False: there are none. */
 static bool motion(const bst_custody_orbit *o, const double x[N], int count, const double *time_s,
                    bst_vec3 *r, bst_vec3 *v) {
-    const bool flat = o->elements.inclination_rad < BST_CUSTODY_LEAST_INCLINATION_RAD;
+    const bool osculating = bst_custody_osculates(&o->elements);
     bst_elements set = o->elements;
     bst_sgp4 *sgp4;
-    if ((!flat && !elements_at(o, x, &set)) ||
+    if ((!osculating && !elements_at(o, x, &set)) ||
         bst_sgp4_create_near(NULL, &set, o->elements.eccentricity, BST_SGP4_WGS72,
                              BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
         return false;
@@ -115,7 +116,7 @@ static bool motion(const bst_custody_orbit *o, const double x[N], int count, con
     bool good = true;
     for (int i = 0; good && i < count; i++) {
         good = bst_sgp4_motion(sgp4, (o->epoch_offset_s + time_s[i]) / 60.0, &r[i], &v[i]) &&
-               (!flat || near_equator_motion(o, r[i], v[i], x, time_s[i], &r[i], &v[i]));
+               (!osculating || osculating_motion(o, r[i], v[i], x, time_s[i], &r[i], &v[i]));
     }
     bst_sgp4_free(sgp4);
     return good;
@@ -129,26 +130,6 @@ static bool motion(const bst_custody_orbit *o, const double x[N], int count, con
  * (Norgaard, Poulsen and Ravn, "New developments in state estimation for nonlinear systems",
  * Automatica 36, 2000). */
 #define SPREAD 1.7320508075688772
-
-/* Lower triangular root of a covariance. False: it is singular. */
-static bool make_root(const double p[N][N], double root[N][N]) {
-    double unit[N];
-    for (int i = 0; i < N; i++) {
-        unit[i] = sqrt(p[i][i]);
-        for (int j = 0; j <= i; j++) {
-            root[i][j] = p[i][j] / (unit[i] * unit[j]);
-        }
-    }
-    if (!bst_cholesky_factor(&root[0][0], N, N, 1e-15)) {
-        return false;
-    }
-    for (int i = 0; i < N; i++) {
-        for (int j = 0; j < N; j++) {
-            root[i][j] = j <= i ? root[i][j] * unit[i] : 0.0;
-        }
-    }
-    return true;
-}
 
 /* What was measured: direction and rate of a track, or directions at some times. */
 typedef struct measurement {
@@ -193,11 +174,12 @@ static bool residuals(const bst_custody_orbit *o, const double x[N], const measu
 
 /* Correlation of the photocentre's displacement at two directions of a pass. It turns with the line
  * of sight and grows with the phase angle, by about itself in a radian; as the object goes round,
- * both change by its mean motion at most beside the line of sight's own turn. */
+ * both change by its rate at perigee at most beside the line of sight's own turn. */
 static double photocentre_correlation(const bst_custody_orbit *o, const bst_od_observation *a,
                                       const bst_od_observation *b) {
-    const double turn =
-        o->elements.mean_motion_radpmin / 60.0 * (b->observer.time_s - a->observer.time_s);
+    const double e = o->elements.eccentricity, n = o->elements.mean_motion_radpmin / 60.0;
+    const double rate = n * sqrt((1.0 + e) / (1.0 - e)) / (1.0 - e);
+    const double turn = rate * (b->observer.time_s - a->observer.time_s);
     const bst_vec3 between = bst_vec3_sub(b->direction, a->direction);
     return exp(-0.5 * (turn * turn + bst_vec3_dot(between, between)));
 }
@@ -252,7 +234,7 @@ typedef struct linear {
 static bool linearise(const bst_custody_orbit *o, const double x[N], const double p[N][N],
                       const measurement *z, linear *out) {
     double root[N][N], y[M], range_m[BST_CUSTODY_DIRECTIONS], unused[BST_CUSTODY_DIRECTIONS];
-    if (!make_root(p, root) || !residuals(o, x, z, y, range_m)) {
+    if (!bst_custody_root(p, root) || !residuals(o, x, z, y, range_m)) {
         return false;
     }
     memcpy(out->y, y, sizeof y);
@@ -570,7 +552,8 @@ bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_cust
                                   double time_s, bst_vec3 *position_teme_m, double *sigma_m) {
     double root[N][N], sum = 0.0;
     bst_vec3 v;
-    if (!make_root(filter->p, root) || !motion(orbit, filter->x, 1, &time_s, position_teme_m, &v)) {
+    if (!bst_custody_root(filter->p, root) ||
+        !motion(orbit, filter->x, 1, &time_s, position_teme_m, &v)) {
         return false;
     }
     for (int k = 0; k < N; k++) {

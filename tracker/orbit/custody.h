@@ -25,9 +25,14 @@ enum {
 
 enum { BST_CUSTODY_DIRECTIONS = 16 }; /* most of an update */
 
-/* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
- * Moon: 0.02 degrees), and differences are those of osculating elements. */
-#define BST_CUSTODY_LEAST_INCLINATION_RAD (0.2 * BST_DEG_RAD)
+/* Whether SGP4's periodics are not smooth in its elements, and differences are those of osculating
+ * elements: at inclinations below 0.2 degrees (Lyddane's, by Sun and Moon: 0.02 degrees), and at
+ * eccentricities below 1e-3 in orbits of 225 minutes or longer, whose eccentricity Sun and Moon
+ * change along the line of apsides, which a circular orbit lacks (up to 90 m at 26,560 km). */
+static inline bool bst_custody_osculates(const bst_elements *e) {
+    return e->inclination_rad < 0.2 * BST_DEG_RAD ||
+           (e->eccentricity < 1e-3 && e->mean_motion_radpmin < 2.0 * BST_PI / 225.0);
+}
 
 typedef struct bst_custody_config {
     double sigma_m;         /* of each component except DRIFT, at the epoch of the elements */
@@ -134,6 +139,10 @@ bool bst_custody_catalogued_position(const bst_custody_orbit *orbit, double time
  * False: no state, or the covariance is singular. */
 bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                                   double time_s, bst_vec3 *position_teme_m, double *sigma_m);
+
+/* Lower triangular root of a covariance; the rest of `root` is 0. False: it is singular. */
+bool bst_custody_root(const double p[BST_CUSTODY_STATE][BST_CUSTODY_STATE],
+                      double root[BST_CUSTODY_STATE][BST_CUSTODY_STATE]) BST_MUST_CHECK;
 
 /* Normalised estimation error squared against an object that moves on its catalogued elements; 6
  * degrees of freedom. NAN: the covariance is singular. */

@@ -1,4 +1,5 @@
-/* An object's filter: its first covariance, process noise, errors against their covariance. */
+/* An object's filter: its first covariance, process noise, root of a covariance, errors
+ * against it. */
 #include <assert.h>
 #include <math.h>
 #include <string.h>
@@ -42,6 +43,25 @@ void bst_custody_add_process_noise(const bst_custody_config *config, double time
     p[BST_CUSTODY_ALONG][BST_CUSTODY_DRIFT] += cross;
     p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] += rate * (to * to * to - from * from * from) / 3.0;
     filter->noise_until_s = time_s;
+}
+
+bool bst_custody_root(const double p[N][N], double root[N][N]) {
+    double unit[N];
+    for (int i = 0; i < N; i++) {
+        unit[i] = sqrt(p[i][i]);
+        for (int j = 0; j <= i; j++) {
+            root[i][j] = p[i][j] / (unit[i] * unit[j]);
+        }
+    }
+    if (!bst_cholesky_factor(&root[0][0], N, N, 1e-15)) {
+        return false;
+    }
+    for (int i = 0; i < N; i++) {
+        for (int j = 0; j < N; j++) {
+            root[i][j] = j <= i ? root[i][j] * unit[i] : 0.0;
+        }
+    }
+    return true;
 }
 
 double bst_custody_nees(const bst_custody_filter *filter) {

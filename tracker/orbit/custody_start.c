@@ -4,32 +4,11 @@
 #include <string.h>
 
 #include "sim/astro/sgp4_fit.h"
-#include "sim/core/cholesky.h"
 #include "tracker/orbit/custody.h"
 
 enum { N = BST_CUSTODY_STATE };
 /* B* of satellites in low orbits, 1 / Earth radii: the order of a catalogue's at 500 km */
 #define UNKNOWN_BSTAR 3e-4
-
-/* Lower triangular root of a covariance; the rest is 0. False: it is singular. */
-static bool root_of(const double p[N][N], double root[N][N]) {
-    double unit[N];
-    for (int i = 0; i < N; i++) {
-        unit[i] = sqrt(p[i][i]);
-        for (int j = 0; j <= i; j++) {
-            root[i][j] = p[i][j] / (unit[i] * unit[j]);
-        }
-    }
-    if (!bst_cholesky_factor(&root[0][0], N, N, 1e-15)) {
-        return false;
-    }
-    for (int i = 0; i < N; i++) {
-        for (int j = 0; j < N; j++) {
-            root[i][j] = j <= i ? root[i][j] * unit[i] : 0.0;
-        }
-    }
-    return true;
-}
 
 /* Elements as numbers that are regular for circular and equatorial orbits; mean motion in rad/s. */
 static void regular_of(double n, double e, double inclination, double raan, double perigee,
@@ -79,7 +58,7 @@ bool bst_custody_difference(const bst_custody_orbit *orbit, const bst_custody_fi
     double root[N][N], from[N], at[N];
     bst_vec3 r, v;
     memset(out, 0, sizeof *out);
-    if (!root_of(filter->p, root) ||
+    if (!bst_custody_root(filter->p, root) ||
         !osculating_numbers(position_teme_m, velocity_teme_mps, from) ||
         !bst_custody_state(orbit, filter->x, time_s, &r, &v) || !osculating_numbers(r, v, at)) {
         return false;
@@ -130,11 +109,12 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
     bst_elements elements = {.epoch_utc_jd1 = fix->epoch_utc_jd[0],
                              .epoch_utc_jd2 = fix->epoch_utc_jd[1]};
     memset(filter, 0, sizeof *filter);
-    if (!root_of(fix->covariance, root) || !numbers_through(r, v, false, &elements, unused) ||
+    if (!bst_custody_root(fix->covariance, root) ||
+        !numbers_through(r, v, false, &elements, unused) ||
         bst_custody_orbit_init(&quiet, &elements, -fix->time_s, photocentre_m, orbit) != BST_OK) {
         return false;
     }
-    const bool flat = elements.inclination_rad < BST_CUSTODY_LEAST_INCLINATION_RAD;
+    const bool osculating = bst_custody_osculates(&elements);
     for (int k = 0; k < N; k++) {
         double side[2][N], column[N];
         for (int s = 0; s < 2; s++) {
@@ -142,8 +122,8 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
             const bst_vec3 dr = {root[0][k], root[1][k], root[2][k]};
             const bst_vec3 dv = {root[3][k], root[4][k], root[5][k]};
             bst_elements near = elements;
-            if (!numbers_through(bst_vec3_axpy(r, to, dr), bst_vec3_axpy(v, to, dv), flat, &near,
-                                 side[s])) {
+            if (!numbers_through(bst_vec3_axpy(r, to, dr), bst_vec3_axpy(v, to, dv), osculating,
+                                 &near, side[s])) {
                 return false;
             }
         }

@@ -119,6 +119,15 @@ void bst_od_linker_drop(bst_od_linker *l, int index) {
     l->items[index] = l->items[--l->count];
 }
 
+/* Whether an item's times are those of a run. */
+static bool is_possible(const bst_od_linked *item) {
+    bool possible = fabs(item->state.time_s) <= BST_OD_LONGEST_S;
+    for (int i = 0; i < item->count; i++) {
+        possible = possible && fabs(item->directions[i].observer.time_s) <= BST_OD_LONGEST_S;
+    }
+    return possible;
+}
+
 bst_status bst_od_linker_archive(bst_od_linker *l, bst_archive *archive) {
     l->count = bst_archive_count(archive, l->count, BST_OD_LINK_ORBITS);
     BST_ARCHIVE(archive, l->made);
@@ -129,6 +138,12 @@ bst_status bst_od_linker_archive(bst_od_linker *l, bst_archive *archive) {
             return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
                             "the saved state has %d directions of %d arcs of an unknown object",
                             (int)l->items[i].count, (int)l->items[i].arcs);
+        }
+        if (!is_possible(&l->items[i])) {
+            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                            "the saved state has an unknown object at a time more than %g s from "
+                            "the epoch",
+                            BST_OD_LONGEST_S);
         }
     }
     return BST_OK;

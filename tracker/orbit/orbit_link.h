@@ -42,7 +42,8 @@ int bst_od_link_arc(bst_od_linker *linker, const bst_od_motion *motion,
 /* Removes an item; the last one takes its index. */
 void bst_od_linker_drop(bst_od_linker *linker, int index);
 
-/* Saves or restores the arcs and orbits. Errors: BST_ERR_FORMAT: a number of them is impossible */
+/* Saves or restores the arcs and orbits. Errors: BST_ERR_FORMAT: a number or a time of them
+ * is impossible (above BST_OD_LONGEST_S) */
 bst_status bst_od_linker_archive(bst_od_linker *linker, bst_archive *archive) BST_MUST_CHECK;
 
 #endif

@@ -6,6 +6,9 @@
 #include "sim/astro/sky_clock.h"
 #include "sim/astro/trajectory.h"
 
+/* Longest time from an epoch that a saved state may have, s: SGP4 steps to it by 720 minutes. */
+#define BST_OD_LONGEST_S 1e10
+
 /* SGP4 as motion model: the orbit is the one that passes through a state (bst_sgp4_through);
  * velocities are derivatives of positions. */
 typedef struct bst_od_sgp4 {
