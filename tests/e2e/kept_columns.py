@@ -26,7 +26,7 @@ MOMENT = re.compile(r"(\d{4})-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(\.\d+)?Z?")
 SINCE = datetime.datetime(2022, 6, 1)
 # Of the machine or the day, as whole words ("_" parts words): "conversion", "origin_x" and "DATE-OBS" are results.
 OWN = re.compile(r"(?i)(?<![a-z])(?:versions?|wall|real_time|device|created|createdby|creation|creator|originator|revision|commit|software|"
-                 r"compiler|library|hostname|cpu|processor|threads|pacing|lateness|checksum|datasum|date(?!-)|program|page_bytes|digest|sha256|"
+                 r"compiler|library|hostname|cpu|processor|threads|pacing|lateness|checksum|datasum|date(?![-_])|program|page_bytes|digest|sha256|"
                  r"free_bytes|memory|token|took|pcount|theap|ztension|elapsed|uuid|nonce|meta\.content|says speed)(?![a-z])|"
                  r"columns\[\]\.(?:name|type|unit|doc)|kernels\.|_ms\b|\.bytes\b")
 SIZE = re.compile(r"[\d.]+ [kMG]?B$")  # of a file, which compression of other numbers changes
