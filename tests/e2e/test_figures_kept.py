@@ -275,7 +275,7 @@ def scene_linked(k):
             part.wait()
             part.stderr.close()
     k.add("linked", out)
-    for name in ("tick", "time_s"):  # when a peer came
+    for name in ("tick", "time_s", "source~"):  # when a peer came, and which part noticed
         k.columns.columns.pop(f"linked/run.sqlite events.{name}", None)
 
 
