@@ -28,8 +28,8 @@ bst_status bst_body_glints_list(bst_ctx *ctx, const bst_satellite *satellite,
  *
  * Given:     turn_rad  rotation of the body and its joints in the exposure
  *            pose      work memory; its joints are turned
- * Returned:  *out  if there are too many, those are left out that others have poses for, and then
- *                   the widest */
+ * Returned:  *out  if there are too many, those are left out that others have poses for; then what
+ *                   the ends of the exposure ask for, which comes last, and then the widest */
 void bst_body_glints_find(const bst_scene_source *source, const bst_body_glint_list *list,
                           double turn_rad, bst_satellite_pose *pose, bst_body_glints *out);
 

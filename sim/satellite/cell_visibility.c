@@ -200,7 +200,7 @@ static double add_visible(const bst_cell_polygon *all, int count, int index, bst
 /* Room for the polygons of a cell. */
 static bst_status reserve(bst_ctx *ctx, bst_visible_surface *s, int count) {
     if (count > s->polygon_capacity) {
-        int capacity = 2 * count + 64;
+        int capacity = count + count / 2 + 8;
         bst_cell_polygon *items = realloc(s->polygons, (size_t)capacity * sizeof *items);
         if (!items) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d parts of facets in a cell",

@@ -6,31 +6,34 @@ static void test_ranges(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_pd_options o = {0};
-    bst_assert_ok(&ctx, bst_pd_range_read(&ctx, "snr", "2:12.5:0.25", 0.1, 1e4, &o));
+    bst_assert_ok(&ctx, bst_pd_range_read(&ctx, "snr", "2:12:0.5", "2:12.5:0.25", 0.1, 1e4, &o));
     assert_true(o.low == 2.0 && o.high == 12.5 && o.step == 0.25);
-    bst_assert_ok(&ctx, bst_pd_range_read(&ctx, "magnitude", "-1.5:-1.5:1e-3", -30.0, 40.0, &o));
+    bst_assert_ok(&ctx, bst_pd_range_read(&ctx, "magnitude", "12:18:0.25", "-1.5:-1.5:1e-3", -30.0,
+                                          40.0, &o));
     assert_true(o.low == -1.5 && o.high == -1.5);
     static const char *const wrong[] = {"",       "2",        "2:3",     "2:3:4:5",  "a:3:1",
                                         "2:3:1x", "nan:3:1",  "2:inf:1", "3:2:1",    "2:3:0",
                                         "2:3:-1", "0.05:3:1", "2:2e4:1", "2:12:0.05"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         bst_pd_options kept = {.low = 7.0, .high = 8.0, .step = 9.0};
-        if (bst_pd_range_read(&ctx, "snr", wrong[i], 0.1, 1e4, &kept) != BST_ERR_ARGUMENT) {
+        if (bst_pd_range_read(&ctx, "snr", "2:12:0.5", wrong[i], 0.1, 1e4, &kept) !=
+            BST_ERR_ARGUMENT) {
             fail_msg("\"%s\" is taken", wrong[i]);
         }
         assert_non_null(strstr(ctx.message, "--snr"));
         assert_true(kept.low == 7.0 && kept.high == 8.0 && kept.step == 9.0);
     }
     /* 200 points are the most: 199 steps */
-    bst_assert_ok(&ctx, bst_pd_range_read(&ctx, "snr", "1:200:1", 0.1, 1e4, &o));
-    assert_int_equal(bst_pd_range_read(&ctx, "snr", "1:201:1", 0.1, 1e4, &o), BST_ERR_ARGUMENT);
+    bst_assert_ok(&ctx, bst_pd_range_read(&ctx, "snr", "2:12:0.5", "1:200:1", 0.1, 1e4, &o));
+    assert_int_equal(bst_pd_range_read(&ctx, "snr", "2:12:0.5", "1:201:1", 0.1, 1e4, &o),
+                     BST_ERR_ARGUMENT);
 }
 
 static void test_lists(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     double out[3] = {7.0, 7.0, 7.0};
-    bst_pd_list list = {"ratio", 1.0, 9.0, out, 3, 0};
+    bst_pd_list list = {"ratio", "1,4", 1.0, 9.0, out, 3, 0};
     bst_assert_ok(&ctx, bst_pd_list_read(&ctx, "1,2.5,4", &list));
     assert_true(list.count == 3 && out[0] == 1.0 && out[1] == 2.5 && out[2] == 4.0);
     bst_assert_ok(&ctx, bst_pd_list_read(&ctx, "9", &list));

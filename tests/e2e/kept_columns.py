@@ -24,10 +24,11 @@ from astropy.io import fits
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 MOMENT = re.compile(r"(\d{4})-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(\.\d+)?Z?")
 SINCE = datetime.datetime(2022, 6, 1)
-# of the machine or the day
-OWN = re.compile(r"(?i)version|wall|real_time|device|created|creation|creator|origin|revision|commit|software|compiler|library|"
-                 r"hostname|cpu|processor|threads|pacing|lateness|CHECKSUM|DATASUM|\bDATE\b|PROGRAM|page_bytes|digest|sha256|"
-                 r"free_bytes|memory|token|took_|PCOUNT|THEAP|ZTENSION|elapsed|uuid|nonce|meta\.content|says speed|columns\[\]\.(?:name|type|unit|doc)|kernels\.|_ms\b|\.bytes\b|\bid\b$")
+# Of the machine or the day, as whole words ("_" parts words): "conversion", "origin_x" and "DATE-OBS" are results.
+OWN = re.compile(r"(?i)(?<![a-z])(?:versions?|wall|real_time|device|created|createdby|creation|creator|originator|revision|commit|software|"
+                 r"compiler|library|hostname|cpu|processor|threads|pacing|lateness|checksum|datasum|date(?![-_])|program|page_bytes|digest|sha256|"
+                 r"free_bytes|memory|token|took|pcount|theap|ztension|elapsed|uuid|nonce|meta\.content|says speed)(?![a-z])|"
+                 r"columns\[\]\.(?:name|type|unit|doc)|kernels\.|_ms\b|\.bytes\b")
 SIZE = re.compile(r"[\d.]+ [kMG]?B$")  # of a file, which compression of other numbers changes
 MOST_TEXTS = 12
 FIGURES = ("count", "nulls", "mean", "rms", "least", "greatest", "first", "last", "weighted")

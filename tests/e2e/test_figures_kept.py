@@ -31,6 +31,10 @@ import runs
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "kept")
 LINES_SHOWN = 40
+# Inputs, durations, states of one version, what gnuplot and its fonts draw, raw bytes
+LEFT_OUT = ("scenario.json", "study.json", "wall_clock.csv", "pointing.png", "plot.png", "link.packets")
+TRIES = 3  # of a run that is to be killed before it ends
+ENDINGS_LEFT_OUT = (".mp4", ".state", ".rows")
 FIGURES = kept_columns.FIGURES
 # How far figures may be apart, in parts of their column's RMS: GCC 12 and clang 19 agree to 1e-8. Columns in which another
 # libm and other kernels differ by more have tolerances of their own ("apart" in the files).
@@ -78,7 +82,7 @@ class Kept:
             for root, folders, files in os.walk(path):
                 folders.sort()
                 for file in sorted(files):
-                    if file not in ("scenario.json", "study.json", "wall_clock.csv") and not file.endswith((".mp4", ".state", ".rows")):
+                    if file not in LEFT_OUT and not file.endswith(ENDINGS_LEFT_OUT):
                         place = os.path.relpath(os.path.join(root, file), path)
                         kind = re.sub(r"\d+", "#", place) if place.count(os.sep) or place.endswith(".png") else place
                         self.columns.put_file(f"{name}/{kind}", os.path.join(root, file))
@@ -105,22 +109,28 @@ class Kept:
         return out
 
     def run_in_two(self, name, scene, save_every_s, saves, *words):
-        """A run that is killed after some saved states and goes on from the last of them."""
+        """A run that is killed after some saved states and goes on from the last of them. One that is over before is tried again."""
         path, out = self.write(name + ".json", scene), self.path(name)
         line = [runs.BORESIGHT, "run", path, "--quiet", "--out", out, "--threads", "1", "--no-pictures",
                 "--save-every", str(save_every_s), *words]
-        state, seen = os.path.join(out + ".partial", "state"), set()
-        with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-            while process.poll() is None and len(seen) < saves:
-                try:
-                    seen.add(os.stat(state).st_mtime_ns)
-                except OSError:
-                    pass
-                time.sleep(0.001)
-            process.send_signal(signal.SIGKILL)
-        if len(seen) < saves:  # it was over before
+        state = os.path.join(out + ".partial", "state")
+        for _ in range(TRIES):
             shutil.rmtree(out, ignore_errors=True)
-            return self.run(name, scene, *words)
+            shutil.rmtree(out + ".partial", ignore_errors=True)
+            seen = set()
+            with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+                while process.poll() is None and len(seen) < saves:
+                    try:
+                        seen.add(os.stat(state).st_mtime_ns)
+                    except OSError:
+                        pass
+                    time.sleep(0.001)
+                process.send_signal(signal.SIGKILL)
+                said = process.stderr.read().decode()
+            if os.path.exists(state) and len(seen) == saves:
+                break
+        else:
+            raise RuntimeError(f"{name}: {len(seen)} of {saves} saved states seen, then the run was over: {said}")
         self.call(name + " run", *line[1:], "--restore", state, adds=[out])
         return out
 
@@ -146,8 +156,6 @@ def scene_unlike(k):
     out = k.run("unlike", kept_scenes.unlike(), pictures=True)
     k.call("info", "info", out, "--json")
     k.call("report", "report", out, "--out", k.path("report.html"), adds=[k.path("report.html")])
-    k.call("orbit", "orbit", out, "--sensor", "far", "--report", k.path("o.json"), "--oem", k.path("o.oem"), "--tdm", k.path("o.tdm"),
-           "--omm", k.path("omm.json"), adds=[k.path(n) for n in ("o.json", "o.oem", "o.tdm", "omm.json")])
     k.export("csv", out, "--observations", "csv")
     k.export("filtered", out, "--observations", "json", "--angles", "filtered")
     k.export("oem", out, "--orbits", "oem", "--step", "5", "--observations", "tdm")
@@ -179,7 +187,7 @@ def scene_unlike_derived(k):
     k.call("figures", "check", path, "--figures", "-")
     for sensor in ("neossat/skewed", "neossat/turned", "follower/far"):
         k.call(f"loop {sensor}", "loop", path, "--json", "-", "--sensor", sensor)
-    k.call("loop plot", "loop", path, "--plot", k.path("loop.svg"), adds=[k.path("loop.svg")])
+    k.call("loop", "loop", path)
     k.call("lightcurve", "lightcurve", path, "--duration", "600", "--step", "40", "--output", k.path("l.csv"), "--object", "NEIGHBOUR",
            "--observer", "follower", adds=[k.path("l.csv")])
     k.call("pd", "pd", path, "--sensor", "follower/far", "--snr", "4:8:2", "--trials", "60", "--empty-frames", "12",
@@ -234,7 +242,8 @@ def scene_files(k):
 
 def scene_oem(k):
     out = k.run_in_two("oem", kept_scenes.oem(), 10, 2)
-    k.call("orbit", "orbit", out, "--report", k.path("o.json"), adds=[k.path("o.json")])
+    k.call("orbit", "orbit", out, "--report", k.path("o.json"), "--oem", k.path("o.oem"), "--tdm", k.path("o.tdm"),
+           "--omm", k.path("omm.json"), adds=[k.path(n) for n in ("o.json", "o.oem", "o.tdm", "omm.json")])
     k.call("report", "report", out, "--out", k.path("report.html"), adds=[k.path("report.html")])
     without_scenario(k, out)
 
@@ -253,12 +262,20 @@ def scene_linked(k):
     path, out, address = k.write("linked.json", scene), k.path("linked"), "ipc://" + k.path("link")
     words = [["run", path, "--out", out, "--threads", "1", "--no-pictures", "--link", address, "--external", "tracker,control"],
              *(["serve", path, "--threads", "1", "--link", address, "--part", part] for part in ("tracker", "control"))]
-    with open(os.devnull, "w", encoding="utf-8") as null:
-        parts = [subprocess.Popen([runs.BORESIGHT, *w], stdout=null, stderr=null) for w in words]
+    parts = [subprocess.Popen([runs.BORESIGHT, *w], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) for w in words]
+    try:
         for name, part in zip(("run", "tracker", "control"), parts):
-            k.columns.put(f"linked {name} exit", float(part.wait(120)))
+            said = part.communicate(timeout=120)[1].decode()
+            if part.returncode:
+                raise RuntimeError(f"linked: {name} ended with {part.returncode}: {said}")
+            k.columns.put(f"linked {name} exit", float(part.returncode))
+    finally:
+        for part in parts:
+            part.kill()
+            part.wait()
+            part.stderr.close()
     k.add("linked", out)
-    for name in ("tick", "time_s"):  # when a peer came
+    for name in ("tick", "time_s", "source~"):  # when a peer came, and which part noticed
         k.columns.columns.pop(f"linked/run.sqlite events.{name}", None)
 
 
@@ -285,9 +302,8 @@ def scene_rate(k):
 
 
 def scene_passing(k):
-    out = k.run_in_two("passing", kept_scenes.passing(), 4, 2)
+    k.run_in_two("passing", kept_scenes.passing(), 4, 2)
     k.call("loop", "loop", k.path("passing.json"), "--json", "-")
-    k.call("orbit", "orbit", out, "--report", k.path("o.json"), adds=[k.path("o.json")])
 
 
 def scene_recorded(k):

@@ -292,11 +292,15 @@ class WrongCalls(unittest.TestCase):
                                   (["--pair", "--separation", "2,1"], 2, "above the one before"),
                                   (["--pair", "--separation", "1,,2"], 2, "not a list"),
                                   (["--pair", "--separation", "1000"], 1, "no room"),
-                                  (["--pair", "--snr", "20;50"], 2, "not a list"),
+                                  (["--pair", "--snr", "20;50"], 2, "for example 20,50,100"),
+                                  (["--pair", "--snr", "20:50"], 2, "for example 20:100:20"),
+                                  (["--pair", "--ratio", "x"], 2, "for example 1,4"),
                                   (["--pair", "--snr", "10:100:1"], 2, "at most 24"),
                                   (["--pair", "--magnitude", "9:12:1"], 2, "leave out --magnitude"),
                                   (["--pair", "--stars"], 2, "leave out --stars"),
                                   (["--pair", "--stack", "8"], 2, "leave out --stack"),
+                                  (["--pair", "--known-rate", "--streak", "9"], 2, "leave out --known-rate"),
+                                  (["--pair", "--apart", "1", "--cell", "16"], 1, "--cell 16: at least 23."),
                                   (["--pair", "--false-splits", "0.5"], 2, "0 to 0.1"),
                                   (["--pair", "--module", "--false-splits", "0.01"], 1, "--set")):
             result = pd(*words)

@@ -71,8 +71,11 @@ class Shapes(unittest.TestCase):
             for k in range(4):
                 self.assertLess(abs(float(v[k]) - float(v[k + 4])), 0.01)
             self.assertGreater(len(set(v[:4])), 2)
-            with open(plot, encoding="utf-8") as file:
-                self.assertIn("<svg", file.read())
+            if os.path.exists(plot):  # gnuplot may be missing: a warning then
+                with open(plot, encoding="utf-8") as file:
+                    self.assertIn("<svg", file.read())
+            else:
+                self.assertIn("gnuplot", one.stderr)
 
     def test_light_curve_of_a_scenario(self):
         shown = boresight("lightcurve", "scenarios/neossat_geo_track.json", "--duration", "60", "--step", "20")

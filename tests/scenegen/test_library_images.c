@@ -183,6 +183,7 @@ static void test_library(void **state) {
     }
     closedir(folder);
     assert_true(wanted || satellites >= 15);
+    assert_true(count > 0); /* else: no such satellite, no such view, or no light */
     qsort(ratios, (size_t)count, sizeof ratios[0], compare_numbers);
     print_message("%d images, %d broken; predicted over found: least %.2f, median %.2f\n", count,
                   broken, ratios[0], ratios[count / 2]);

@@ -15,6 +15,9 @@ enum { BST_PD_POINTS = 200, BST_PD_PHASES = 10 };
 /* Largest separation of pairs that are chosen by the bound, FWHM. */
 #define BST_PD_WIDEST_PAIR_FWHM 4.0
 
+/* Detections within this many FWHM of a pair's light, beside its separation, are its own. */
+#define BST_PD_PAIR_REACH_FWHM 2.5
+
 /* Options of a measurement. */
 typedef struct bst_pd_options {
     double low, high, step; /* SNR; V magnitude if by_magnitude */
@@ -27,7 +30,8 @@ typedef struct bst_pd_options {
     double background_e;  /* sky per pixel and exposure; < 0: from the scenario */
     double jitter_px;     /* blur per axis; < 0: as configured for image processing */
     double min_separation_px; /* minimum distance between targets, beyond their length */
-    double cell_px;           /* cell size of the target grid; 0: min_separation_px + length + 40 */
+    double cell_px;           /* cell size of the target grid; 0: the distance that is kept + 40, of
+                               * pairs + 4 */
     bool pairs;               /* targets are pairs of sources: pd_pair.h */
     double widest_pair_px;    /* largest separation; 0: BST_PD_WIDEST_PAIR_FWHM */
     double false_splits;      /* share of single sources, asked of the detector; < 0: scenario's */

@@ -20,8 +20,6 @@ static const double OF_FWHM[CHOSEN] = {1.4, 1.6, 1.7, 1.8, 2.0, 2.2, 2.5, 3.0, 3
 static const double ASKED_PD = 0.9;
 /* False splits of the bound for a detector that does not test for pairs. */
 static const double USUAL_FALSE_SPLITS = 0.01;
-/* Detections within this many FWHM of the pair's light, beside its separation, are its own. */
-static const double REACH_FWHM = 2.5;
 /* Light beyond this from a source does not matter to the bound, FWHM. */
 static const double MARGIN_FWHM = 4.0;
 
@@ -133,7 +131,7 @@ static bool is_of(const bst_detection *d, const bst_eval_match_target *place, do
 static void count_frame(const runner *r, const bst_pd_frame *f, const bst_pd_pair_target *targets,
                         bst_pd_pair_point *p, int64_t *next) {
     for (int i = 0; i < f->count; i++) {
-        double reach = REACH_FWHM * r->scene->fwhm_px + targets[i].separation_px;
+        double reach = BST_PD_PAIR_REACH_FWHM * r->scene->fwhm_px + targets[i].separation_px;
         int near = 0;
         for (int k = 0; k < r->detections->count && near < 2; k++) {
             near += is_of(&r->detections->items[k], &f->places[i], reach);

@@ -129,14 +129,17 @@ const bst_option bst_pd_option_table[] = {
      .kind = BST_OPTION_REAL,
      .offset = offsetof(bst_pd_request, options.min_separation_px),
      .argument = "PX",
-     .doc = "least distance between targets, their own length not counted (default 24)",
+     .doc =
+         "least distance between targets, their own length not counted (default 24); with --pair "
+         "2.5 FWHM and the largest separation at least",
      .minimum = 1,
      .maximum = 1000},
     {.name = "cell",
      .kind = BST_OPTION_REAL,
      .offset = offsetof(bst_pd_request, options.cell_px),
      .argument = "PX",
-     .doc = "one target in each square of this side (default: 40 more than they are apart)",
+     .doc = "one target in each square of this side (default: 40 more than they are apart, with "
+            "--pair 4 more)",
      .minimum = 3,
      .maximum = 32768},
     {.name = "stars",
@@ -171,8 +174,8 @@ const bst_option bst_pd_option_table[] = {
     {.name = NULL},
 };
 
-bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *text, double low,
-                             double high, bst_pd_options *out) {
+bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *example, const char *text,
+                             double low, double high, bst_pd_options *out) {
     double v[3];
     char *end = (char *)text;
     for (int i = 0; i < 3; i++) {
@@ -181,7 +184,7 @@ bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *text, d
         if (end == from || !isfinite(v[i]) || *end != (i < 2 ? ':' : '\0')) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
                             "--%s \"%s\" is not FIRST:LAST:STEP, for example %s", name, text,
-                            strcmp(name, "snr") == 0 ? "2:12:0.5" : "12:18:0.25");
+                            example);
         }
         end += i < 2;
     }
@@ -211,8 +214,8 @@ bst_status bst_pd_list_read(bst_ctx *ctx, const char *text, bst_pd_list *list) {
         more = *end == ',';
         if (end == at || !isfinite(value) || (!more && *end != '\0')) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
-                            "--%s \"%s\" is not a list of numbers, for example 1,4", list->name,
-                            text);
+                            "--%s \"%s\" is not a list of numbers, for example %s", list->name,
+                            text, list->example);
         }
         if (!(value >= list->low && value <= list->high) || (n > 0 && value <= v[n - 1])) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -235,13 +238,13 @@ bst_status bst_pd_list_read(bst_ctx *ctx, const char *text, bst_pd_list *list) {
 static bst_status read_pair_snrs(bst_ctx *ctx, const char *text, bst_pd_request *r) {
     bst_pd_pair_options *p = &r->pairs;
     if (!strchr(text, ':')) {
-        bst_pd_list list = {"snr", LEAST_PAIR_SNR, 1e4, p->snr, BST_PD_PAIR_SNRS, 0};
+        bst_pd_list list = {"snr", "20,50,100", LEAST_PAIR_SNR, 1e4, p->snr, BST_PD_PAIR_SNRS, 0};
         BST_TRY(bst_pd_list_read(ctx, text, &list));
         p->snrs = list.count;
         return BST_OK;
     }
     bst_pd_options range;
-    BST_TRY(bst_pd_range_read(ctx, "snr", text, LEAST_PAIR_SNR, 1e4, &range));
+    BST_TRY(bst_pd_range_read(ctx, "snr", "20:100:20", text, LEAST_PAIR_SNR, 1e4, &range));
     p->snrs = (int)floor((range.high - range.low) / range.step + 1e-9) + 1;
     if (p->snrs > BST_PD_PAIR_SNRS) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "--snr \"%s\": with --pair at most %d SNRs", text,
@@ -260,28 +263,27 @@ static bst_status settle_pairs(bst_ctx *ctx, bst_pd_request *r) {
     const struct {
         const char *name;
         bool given;
-    } other[] = {{"magnitude", r->magnitudes},
-                 {"stack", o->stack > 0},
-                 {"stars", o->stars},
-                 {"star-streak", o->star_streak_px > 0.0},
-                 {"empty-frames", o->empty_frames > 0}};
+    } other[] = {{"magnitude", r->magnitudes},  {"stack", o->stack > 0},
+                 {"stars", o->stars},           {"star-streak", o->star_streak_px > 0.0},
+                 {"known-rate", o->known_rate}, {"empty-frames", o->empty_frames > 0}};
     for (size_t i = 0; i < sizeof other / sizeof *other; i++) {
         if (other[i].given) {
-            return bst_fail(ctx, BST_ERR_ARGUMENT,
-                            "--pair measures pairs over SNR in single frames without stars: leave "
-                            "out --%s",
-                            other[i].name);
+            return bst_fail(
+                ctx, BST_ERR_ARGUMENT,
+                "--pair measures pairs over SNR in single frames without stars, streaks "
+                "with known motion: leave out --%s",
+                other[i].name);
         }
     }
     o->trials = o->trials > 0 ? o->trials : 300;
     BST_TRY(read_pair_snrs(ctx, r->range ? r->range : "20,50,100,200", r));
     if (r->separations) {
         bst_pd_list list = {
-            "separation", 0.01, 1000.0, p->separation_px, BST_PD_PAIR_SEPARATIONS, 0};
+            "separation", "0.8,1,1.3", 0.01, 1000.0, p->separation_px, BST_PD_PAIR_SEPARATIONS, 0};
         BST_TRY(bst_pd_list_read(ctx, r->separations, &list));
         p->separations = list.count;
     }
-    bst_pd_list list = {"ratio", 1.0, 1000.0, p->ratio, BST_PD_PAIR_RATIOS, 0};
+    bst_pd_list list = {"ratio", "1,4", 1.0, 1000.0, p->ratio, BST_PD_PAIR_RATIOS, 0};
     BST_TRY(bst_pd_list_read(ctx, r->ratios ? r->ratios : "1,4", &list));
     p->ratios = list.count;
     return BST_OK;
@@ -295,12 +297,13 @@ static bst_status settle_curve(bst_ctx *ctx, bst_pd_request *r) {
     }
     o->trials = o->trials > 0 ? o->trials : 1000;
     o->by_magnitude = r->magnitudes;
-    BST_TRY(r->magnitudes ? bst_pd_range_read(ctx, "magnitude", r->magnitudes, -30.0, 40.0, o)
-                          : bst_pd_range_read(ctx, "snr",
-                                              r->range       ? r->range
-                                              : o->stack > 0 ? "0.8:2.4:0.1"
-                                                             : "2:12:0.5",
-                                              0.1, 1e4, o));
+    BST_TRY(r->magnitudes
+                ? bst_pd_range_read(ctx, "magnitude", "12:18:0.25", r->magnitudes, -30.0, 40.0, o)
+                : bst_pd_range_read(ctx, "snr", "2:12:0.5",
+                                    r->range       ? r->range
+                                    : o->stack > 0 ? "0.8:2.4:0.1"
+                                                   : "2:12:0.5",
+                                    0.1, 1e4, o));
     if (o->known_rate && o->star_streak_px > 0.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "with --known-rate stars streak as targets do: leave out --star-streak");
@@ -321,7 +324,7 @@ static bst_status settle_curve(bst_ctx *ctx, bst_pd_request *r) {
 }
 
 bst_status bst_pd_request_settle(bst_ctx *ctx, bst_pd_request *r, const bst_option *table) {
-    if (r->options.known_rate && !(r->options.streak_px > 0.0)) {
+    if (!r->pair && r->options.known_rate && !(r->options.streak_px > 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--known-rate is of streaks: give their length with --streak PX");
     }

@@ -36,17 +36,18 @@ extern const bst_option bst_pd_option_table[];
 /* Reads FIRST:LAST:STEP, such as "2:12:0.5", into low, high and step of `out`.
  *
  * Given:     name       of the option, for messages
+ *            example    one that is right
  *            low, high  least first and greatest last value allowed
  * Errors:    BST_ERR_ARGUMENT: not three finite numbers, out of range, in the wrong order, a step
  *            of 0 or less, or BST_PD_POINTS steps or more */
-bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *text, double low,
-                             double high, bst_pd_options *out) BST_MUST_CHECK;
+bst_status bst_pd_range_read(bst_ctx *ctx, const char *name, const char *example, const char *text,
+                             double low, double high, bst_pd_options *out) BST_MUST_CHECK;
 
 /* A list of an option. */
 typedef struct bst_pd_list {
-    const char *name; /* of the option, for messages */
-    double low, high; /* least and greatest value allowed */
-    double *values;   /* [most], lent */
+    const char *name, *example; /* of the option and one that is right, for messages */
+    double low, high;           /* least and greatest value allowed */
+    double *values;             /* [most], lent */
     int most, count;
 } bst_pd_list;
 

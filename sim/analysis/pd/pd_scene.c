@@ -214,11 +214,15 @@ static bst_status set_own_light(bst_ctx *ctx, bst_pd_scene *s) {
 
 static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
     const bst_pd_options *o = &s->options;
-    s->min_separation_px = o->min_separation_px + o->streak_px;
+    s->min_separation_px = o->min_separation_px;
+    if (o->pairs) { /* no source of a neighbour within the reach of a pair */
+        double widest =
+            o->widest_pair_px > 0.0 ? o->widest_pair_px : BST_PD_WIDEST_PAIR_FWHM * s->fwhm_px;
+        double reach = BST_PD_PAIR_REACH_FWHM * s->fwhm_px + widest;
+        s->min_separation_px = fmax(s->min_separation_px, reach) + widest;
+    }
+    s->min_separation_px += o->streak_px;
     s->min_separation_px += o->stack > 0 ? o->rates_px * (double)(o->stack - 1) : 0.0;
-    s->min_separation_px += !o->pairs                 ? 0.0
-                            : o->widest_pair_px > 0.0 ? o->widest_pair_px
-                                                      : BST_PD_WIDEST_PAIR_FWHM * s->fwhm_px;
     s->cell_px = o->cell_px > 0.0 ? o->cell_px : s->min_separation_px + (o->pairs ? 4.0 : 40.0);
     if (s->cell_px < s->min_separation_px + 2.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,

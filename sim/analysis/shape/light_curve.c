@@ -34,7 +34,7 @@ static bst_status check_norad(bst_ctx *ctx, const bst_light_curve_request *r, co
 }
 
 /* Attitude of a satellite without a scenario: the name of a law, or JSON as in scenarios. Returns
- * *phases, which the caller frees; NULL: out of memory. */
+ * *phases, which the caller frees. BST_ERR_MEMORY. */
 static bst_status read_attitude(bst_ctx *ctx, const char *text, cJSON **phases) {
     if (*text != '[' && *text != '{') {
         cJSON *phase = cJSON_CreateObject();
@@ -47,6 +47,9 @@ static bst_status read_attitude(bst_ctx *ctx, const char *text, cJSON **phases) 
     BST_TRY(bst_json_parse(ctx, "--attitude", text, strlen(text), &json));
     cJSON *given = cJSON_Duplicate(bst_json_root(json), true);
     bst_json_free(json);
+    if (!given) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an attitude");
+    }
     *phases = given;
     if (cJSON_IsObject(given)) { /* one phase */
         *phases = cJSON_CreateArray();
