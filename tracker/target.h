@@ -63,7 +63,8 @@ typedef struct bst_target {
     bst_vec3 departure_radps;
     /* Identity: the probability that the target is the cue's object, given that one of the tracks
      * is. While `ambiguous` it is computed anew in each frame; a target that was once certain keeps
-     * its identity until it has shared detections with another object, or a new track fits the cue.
+     * its identity until it has shared detections with another object, or a new track may be the
+     * cue's object.
      */
     bool ambiguous;
     bool merged; /* it has shared detections since it was last resolved */

@@ -161,8 +161,20 @@ static double half_light(const draft *d, double level, int lit, int dark) {
     return from > to ? fmax(fmin((from - 0.5) / (from - to), 1.0), 0.0) : 0.0;
 }
 
+/* True if the stars' light goes on beyond an end of the path: at two of the second to fourth sample
+ * beyond it, which the PSF does not reach, it is more than half the level. Where most stars have
+ * light of others there, it is neither one star's light nor none, and is no evidence. */
+static bool goes_on(const draft *d, double level, int end, int step) {
+    int lit = 0;
+    for (int i = 2; i <= 4; i++) {
+        int k = end + step * i;
+        lit += k >= 0 && k < d->count && d->light[k] > 0.5 * level;
+    }
+    return lit >= 2;
+}
+
 /* First and last sample of the path, with fractions: the most likely ends, which are those of the
- * stretch with the greatest sum of evidence. */
+ * stretch with the greatest sum of evidence. An end beyond which light goes on has no margin. */
 static void find_ends(const draft *d, double level, double ends[2], double margin[2]) {
     double sum = 0.0, best = -HUGE_VAL;
     int from = 0, first = 0, last = d->count - 1;
@@ -178,8 +190,8 @@ static void find_ends(const draft *d, double level, double ends[2], double margi
             last = k;
         }
     }
-    margin[0] = -rival_end(d, last, first, -1);
-    margin[1] = -rival_end(d, first, last, 1);
+    margin[0] = goes_on(d, level, first, -1) ? 0.0 : -rival_end(d, last, first, -1);
+    margin[1] = goes_on(d, level, last, 1) ? 0.0 : -rival_end(d, first, last, 1);
     ends[0] = first - half_light(d, level, first, first - 1);
     ends[1] = last + half_light(d, level, last, last + 1);
 }

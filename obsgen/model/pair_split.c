@@ -237,7 +237,8 @@ void bst_generator_split_pairs(bst_generator *g) {
     for (int r = 0; r < g->rank_count; r++) {
         generator_source *s = &g->sources[g->ranks[r].index];
         int head = s->head;
-        if (head < 0 || !g->sources[head].found || is_disturbed(g, &g->sources[head])) {
+        if (head < 0 || !g->sources[head].found || g->sources[head].partner >= 0 ||
+            is_disturbed(g, &g->sources[head])) {
             continue;
         }
         joint_errors errors;

@@ -148,6 +148,52 @@ static int above(double level, int *out) {
     return n;
 }
 
+/* Light of unit-height steps along the curve between two of its u. */
+static void draw_part(double sx, double sy, double from, double to, double height) {
+    const int steps = (int)ceil(40.0 * (to - from) / 0.3);
+    for (int k = 0; k < steps; k++) {
+        double dx, dy;
+        curve(0, from + (to - from) * (k + 0.5) / steps, &dx, &dy);
+        add_gaussian(sx + dx, sy + dy, height * 0.3 / (2.0 * PSF * sqrt(BST_PI)));
+    }
+}
+
+/* A bright star and five faint ones, whose streaks end earlier: they may be pieces of streaks. If
+ * they decide the end of the path while the bright star's light goes on, with that of another star
+ * on it, the end is not certain. */
+static void light_beyond_an_end(void **state) {
+    (void)state;
+    enum { STARS = 6 };
+    static bst_star_path p;
+    static int pixels[WIDE * HIGH];
+    static const double at[STARS][2] = {{62, 46},  {30, 25}, {115, 90},
+                                        {110, 25}, {40, 85}, {80, 70}};
+    bst_star_path_star stars[STARS];
+    double x, y;
+    p = (bst_star_path){.centre = {MIDDLE_X, MIDDLE_Y}, .tangent_per_px = 1e-6};
+    memset(image, 0, sizeof image);
+    draw_part(at[0][0], at[0][1], -0.5, 0.2, 30.0);
+    assert_true(bst_star_path_fit(&p, &picture, pixels, above(5.0, pixels), &x, &y));
+    for (int lit = 0; lit < 2; lit++) {
+        bst_star_path path = p;
+        for (int i = 0; i < STARS; i++) {
+            stars[i] = (bst_star_path_star){x + at[i][0] - at[0][0], y + at[i][1] - at[0][1],
+                                            i == 0 ? 30.0 : 5.0};
+            if (lit == 0 && i > 0) {
+                draw_part(at[i][0], at[i][1], -0.5, 0.2, 5.0);
+            }
+        }
+        if (lit) {
+            draw_part(at[0][0], at[0][1], 0.2, 0.5, 60.0);
+        }
+        bst_star_path_refine(&path, &picture, stars, STARS);
+        print_message("%d samples, margins %.1f and %.1f\n", path.count, path.margin[0],
+                      path.margin[1]);
+        assert_true(fmax(path.margin[0], path.margin[1]) > 6.0);
+        assert_true((fmin(path.margin[0], path.margin[1]) > 6.0) == !lit);
+    }
+}
+
 /* The path of one star, and that of several from a worse start, on all four sides. */
 static void path_of_stars(void **state) {
     (void)state;
@@ -382,13 +428,10 @@ static void a_point_beside_a_star(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(map_of_a_turn),
-        cmocka_unit_test(between_pixels),
-        cmocka_unit_test(path_of_stars),
-        cmocka_unit_test(point_source),
-        cmocka_unit_test(two_stars),
-        cmocka_unit_test(over_the_edges),
-        cmocka_unit_test(a_point_beside_a_star),
+        cmocka_unit_test(map_of_a_turn),  cmocka_unit_test(between_pixels),
+        cmocka_unit_test(path_of_stars),  cmocka_unit_test(light_beyond_an_end),
+        cmocka_unit_test(point_source),   cmocka_unit_test(two_stars),
+        cmocka_unit_test(over_the_edges), cmocka_unit_test(a_point_beside_a_star),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
