@@ -164,8 +164,9 @@ class LoopTables:
                     self.assertLess(np.abs((own - carried) / scale).max(), 0.25, number)
                     moved = self.tangent(before) @ (unit(row["ra_deg"], row["dec_deg"]) -
                                                     unit(before["ra_deg"], before["dec_deg"])) / ARCSEC
-                    self.close(moved, steps * np.array([before["rate_east_arcsec_per_s"],
-                                                        before["rate_north_arcsec_per_s"]]), 0.05)
+                    # detections that are hardly its own pull it by a tenth of its sigma
+                    self.close(moved, steps * np.array([before["rate_east_arcsec_per_s"], before["rate_north_arcsec_per_s"]]),
+                               0.05 + 0.15 * np.sqrt(max(own[0, 0], own[1, 1])) / ARCSEC)
                 kept[number] = row
                 if row["target_of_interest"]:
                     target = objects[0]
