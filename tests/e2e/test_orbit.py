@@ -114,7 +114,7 @@ class Orbit(unittest.TestCase):
                 self.assertAlmostEqual(value * 1e6 / covariance[i, k], 1, delta=1e-9, msg=(i, k))
 
     def test_what_it_says(self):
-        self.assertIn("neossat/telescope, track 1 (INMARSAT GX5)\n", self.said)
+        self.assertRegex(self.said, r"^neossat/telescope, track \d+ \(INMARSAT GX5\)\n")
         self.assertIn(f"{self.report['used']} used, 0 left out", self.said)
 
     def test_oem_and_omm(self):
