@@ -130,6 +130,11 @@ static inline bst_io_value bst_io_null_value(bst_io_column_type type) {
     return v;
 }
 
+/* An integer, or NULL unless it is known. */
+static inline bst_io_value bst_io_known_int_value(int64_t value, bool known) {
+    return known ? bst_io_int_value(value) : bst_io_null_value(BST_COLUMN_INT);
+}
+
 /* Creates a table of `count` columns (1 to BST_TABLE_COLUMNS) and notes it in "tables" and
  * "columns". Names are ASCII letters, digits and underscores. The handle is owned by the run. */
 #define BST_TABLE_COLUMNS 64

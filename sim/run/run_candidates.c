@@ -121,8 +121,8 @@ static bst_status confirm(bst_ctx *ctx, bst_run_candidates *c, int at, double la
     if (!bst_custody_start(&fix, UNKNOWN_PHOTOCENTRE_M, &made->orbit, &made->filter)) {
         return BST_OK;
     }
-    made->updates = item->arcs;
-    made->last_s = last_s;
+    made->score.updates = item->arcs;
+    made->score.last_s = last_s;
     made->true_object = c->mixed[at] ? -1 : c->object[at];
     const int last = c->linker.count - 1;
     bst_od_linker_drop(&c->linker, at);
@@ -148,25 +148,20 @@ bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *c, int sens
         c->mixed[at] = was_wrong || true_object < 0 || true_object != c->object[at];
     }
     c->figures.candidates += item->arcs == 2;
-    c->figures.confirmed += item->arcs == 3;
+    c->figures.confirmed += item->arcs == CONFIRMED;
     c->figures.wrong += c->mixed[at] && !was_wrong;
-    if (!c->table) {
-        return confirm(ctx, c, at, arc->state.observer.time_s, made);
+    if (c->table) {
+        const bst_io_value row[] = {bst_io_int_value(sensor),
+                                    bst_io_int_value(arc->id),
+                                    bst_io_real_value(arc->state.observer.time_s),
+                                    bst_io_int_value(item->id),
+                                    bst_io_int_value(item->arcs),
+                                    bst_io_real_value(first ? NAN : item->chi2),
+                                    bst_io_known_int_value(2 * item->count - 6, !first),
+                                    bst_io_known_int_value(true_object, true_object >= 0),
+                                    bst_io_int_value(c->mixed[at])};
+        BST_TRY(bst_io_table_append(ctx, c->table, row));
     }
-#define INT(v, known) \
-    { .type = BST_COLUMN_INT, .is_null = !(known), .as.integer = (v) }
-#define REAL(v, known) \
-    { .type = BST_COLUMN_REAL, .is_null = !(known), .as.real = (v) }
-    const bst_io_value row[] = {INT(sensor, true),
-                                INT(arc->id, true),
-                                REAL(arc->state.observer.time_s, true),
-                                INT(item->id, true),
-                                INT(item->arcs, true),
-                                REAL(item->chi2, !first),
-                                INT(2 * item->count - 6, !first),
-                                INT(true_object, true_object >= 0),
-                                INT(c->mixed[at], true)};
-    BST_TRY(bst_io_table_append(ctx, c->table, row));
     return confirm(ctx, c, at, arc->state.observer.time_s, made);
 }
 

@@ -29,7 +29,7 @@ void bst_run_candidates_free(bst_run_candidates *candidates); /* NULL allowed */
  * Returned:  *made        the new object if the candidate has three tracks or more, and an orbit
  *                         that they determine (batch least squares with a factor on the variances;
  *                         bst_od_solution.bend below 1); the candidate is then removed. Its
- *                         noise is 0. updates 0: none */
+ *                         noise is 0. score.updates 0: none */
 bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *candidates, int sensor,
                                    const bst_run_arc *arc, int true_object,
                                    bst_run_new_object *made) BST_MUST_CHECK;

@@ -32,14 +32,6 @@ enum { IDENTITY = 10 };
 /* an object nearer than this is the observer's spacecraft itself, m */
 #define ITSELF_M 10.0
 
-/* Score of an object. */
-typedef struct score {
-    int64_t updates, cross_tags;
-    double last_s;
-    double chi2_sum; /* of the tracks that updated it themselves, not of those of a new orbit */
-    int64_t chi2_count;
-} score;
-
 struct bst_run_custody {
     const bst_world *world;
     bst_world_view *view;
@@ -50,7 +42,7 @@ struct bst_run_custody {
     double *fwhm_rad;          /* [sensor] of the PSF */
     bst_custody_orbit *orbits; /* [object]; a_m 0: none */
     bst_custody_filter *filters;
-    score *scores;
+    bst_custody_score *scores;
     double *place_m[3]; /* [object] */
     bst_run_arcs *arcs;
     bst_run_candidates *candidates;
@@ -211,7 +203,7 @@ static void archive_object(bst_run_custody *c, int object, bst_archive *archive)
     BST_ARCHIVE(archive, c->scores[object]);
     if (memcmp(saved, own, sizeof own) != 0) {
         c->filters[object] = start;
-        c->scores[object] = (score){.last_s = NAN};
+        c->scores[object] = (bst_custody_score){.last_s = NAN};
     }
 }
 
@@ -231,10 +223,9 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
 
 /* ---- correlation ---- */
 
-/* Whether an object whose position is known within `within_m` and by its filter may be on the line
- * of sight. */
+/* Whether an object at a tabulated position may be on the line of sight. */
 static bool may_be(const bst_custody_orbit *orbit, const bst_custody_filter *f, bst_vec3 place,
-                   double within_m, const bst_custody_observation *z) {
+                   const bst_custody_observation *z) {
     if (isnan(place.x)) {
         return true;
     }
@@ -251,7 +242,7 @@ static bool may_be(const bst_custody_orbit *orbit, const bst_custody_filter *f, 
                 (f->p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] +
                  days * (2.0 * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] +
                          days * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT]));
-    double reach = within_m + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
+    double reach = TABLE_REACH_M + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
     return along > -reach && across2 < reach * reach;
 }
 
@@ -302,7 +293,7 @@ static void find_new_object(bst_run_custody *c, int sensor, const bst_custody_ob
             continue;
         }
         place = bst_mat3_mul_vec(&z->gcrf_from_teme, place);
-        if (may_be(&o->orbit, &o->filter, place, TABLE_REACH_M, z)) {
+        if (may_be(&o->orbit, &o->filter, place, z)) {
             compare_object(&o->orbit, &o->filter, c->object_count + i, c->fwhm_rad[sensor], z, out);
         }
     }
@@ -321,7 +312,7 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
         const bst_vec3 place = {c->place_m[0][i], c->place_m[1][i], c->place_m[2][i]};
         bst_world_sight sight;
         bst_ctx quiet = {0}; /* an orbit that has ended is no error here */
-        if (!may_be(&c->orbits[i], &c->filters[i], place, TABLE_REACH_M, z) ||
+        if (!may_be(&c->orbits[i], &c->filters[i], place, z) ||
             bst_world_view_sight_from(&quiet, c->view, &eye, i, time_s, &sight) != BST_OK ||
             sight.range_m < ITSELF_M) {
             continue;
@@ -352,13 +343,12 @@ static bool update(const bst_custody_orbit *orbit, const bst_run_arc *arc,
 
 /* Whether a catalogued object's orbit is that of a new one. */
 static bool is_object(bst_run_custody *c, int object, const bst_run_new_object *o, double time_s) {
-    double chi2;
     if (!(c->orbits[object].a_m > 0.0)) {
         return false;
     }
     bst_custody_add_process_noise(&c->config, time_s, &c->filters[object]);
     return bst_run_new_object_is(&c->orbits[object], &c->filters[object], &o->orbit, &o->filter,
-                                 time_s, &chi2);
+                                 time_s);
 }
 
 /* Adds a new object. If its orbit is that of one object that is known, it is not added: a
@@ -374,10 +364,8 @@ static bst_status add_new_object(bst_ctx *ctx, bst_run_custody *c, const bst_run
     }
     for (int i = 0; i < c->new_objects.count; i++) {
         bst_run_new_object *own = &c->new_objects.items[i];
-        double chi2;
         bst_run_new_object_advance(own, time_s);
-        bool same =
-            bst_run_new_object_is(&own->orbit, &own->filter, &o->orbit, &o->filter, time_s, &chi2);
+        bool same = bst_run_new_object_is(&own->orbit, &own->filter, &o->orbit, &o->filter, time_s);
         found += same;
         which = same ? c->object_count + i : which;
     }
@@ -389,39 +377,26 @@ static bst_status add_new_object(bst_ctx *ctx, bst_run_custody *c, const bst_run
         c->figures.new_matched++;
     } else if (found == 1 &&
                bst_run_new_object_carry(&o->orbit, &o->filter, &c->orbits[which], time_s, &anew)) {
-        score *s = &c->scores[which];
+        bst_custody_score *s = &c->scores[which];
         c->figures.new_matched++;
         c->filters[which] = anew;
-        s->updates += o->updates;
-        s->cross_tags += o->true_object == which ? 0 : o->updates;
-        s->last_s = isnan(s->last_s) ? o->last_s : fmax(s->last_s, o->last_s);
+        s->updates += o->score.updates;
+        s->cross_tags += o->true_object == which ? 0 : o->score.updates;
+        s->last_s = fmax(s->last_s, o->score.last_s); /* fmax ignores NAN */
     }
     return BST_OK;
 }
 
 /* Notes the update of an object in its score. Returns its NEES; NAN: it is a new one. */
 static double note_update(bst_run_custody *c, const match *m, double time_s) {
-    if (m->best >= c->object_count) {
-        bst_run_new_object *o = &c->new_objects.items[m->best - c->object_count];
-        const bool crossed = o->true_object < 0 || o->true_object != m->true_object;
-        c->figures.new_tracks++;
-        c->figures.cross_tags += crossed;
-        o->updates++;
-        o->cross_tags += crossed;
-        o->chi2_sum += m->chi2;
-        o->chi2_count++;
-        o->last_s = fmax(o->last_s, time_s);
-        return NAN;
-    }
-    score *s = &c->scores[m->best];
-    const bool crossed = m->best != m->true_object;
+    const bool is_new = m->best >= c->object_count;
+    bst_run_new_object *o = is_new ? &c->new_objects.items[m->best - c->object_count] : NULL;
+    const int64_t own = is_new ? o->true_object : m->best;
+    const bool crossed = own < 0 || own != m->true_object;
+    c->figures.new_tracks += is_new;
     c->figures.cross_tags += crossed;
-    s->updates++;
-    s->cross_tags += crossed;
-    s->chi2_sum += m->chi2;
-    s->chi2_count++;
-    s->last_s = isnan(s->last_s) ? time_s : fmax(s->last_s, time_s);
-    return bst_custody_nees(&c->filters[m->best]);
+    bst_custody_score_add(is_new ? &o->score : &c->scores[m->best], crossed, m->chi2, time_s);
+    return is_new ? NAN : bst_custody_nees(&c->filters[m->best]);
 }
 
 /* Correlates a track that has ended, and updates its object. */
@@ -449,23 +424,23 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     if (unknown) {
         bst_run_new_object made;
         BST_TRY(bst_run_candidates_take(ctx, c->candidates, sensor, arc, m.true_object, &made));
-        if (made.updates > 0) {
+        if (made.score.updates > 0) {
             BST_TRY(add_new_object(ctx, c, &made));
         }
     }
     if (!c->tracks) {
         return BST_OK;
     }
-    const bst_io_value row[] = {bst_custody_whole_number(sensor, true),
-                                bst_custody_whole_number(arc->id, true),
-                                bst_custody_number(z->observer.time_s),
-                                bst_custody_whole_number(arc->hits, true),
-                                bst_custody_whole_number(m.count, true),
-                                bst_custody_whole_number(m.best, updated && new_one < 0),
-                                bst_custody_whole_number(new_one + 1, updated && new_one >= 0),
-                                bst_custody_whole_number(m.true_object, m.true_object >= 0),
-                                bst_custody_number(m.chi2),
-                                bst_custody_number(nees)};
+    const bst_io_value row[] = {bst_io_int_value(sensor),
+                                bst_io_int_value(arc->id),
+                                bst_io_real_value(z->observer.time_s),
+                                bst_io_int_value(arc->hits),
+                                bst_io_int_value(m.count),
+                                bst_io_known_int_value(m.best, updated && new_one < 0),
+                                bst_io_known_int_value(new_one + 1, updated && new_one >= 0),
+                                bst_io_known_int_value(m.true_object, m.true_object >= 0),
+                                bst_io_real_value(m.chi2),
+                                bst_io_real_value(nees)};
     return bst_io_table_append(ctx, c->tracks, row);
 }
 
@@ -485,7 +460,6 @@ bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *c, int sensor,
 static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, double end_s,
                              double *sigma_m, double *nees) {
     const bst_world_object_info *info = bst_world_object(c->world, object);
-    const score *s = &c->scores[object];
     bst_custody_filter *f = &c->filters[object];
     bst_vec3 place, truth;
     double error_m = NAN;
@@ -499,20 +473,8 @@ static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, doubl
     if (!c->objects) {
         return BST_OK;
     }
-    const bst_io_value row[] = {
-        bst_custody_whole_number(object, true),
-        {.type = BST_COLUMN_TEXT, .as.text = info->name},
-        bst_custody_whole_number(info->norad, true),
-        bst_custody_whole_number(s->updates, true),
-        bst_custody_whole_number(s->cross_tags, true),
-        bst_custody_number(s->last_s),
-        bst_custody_number(end_s - s->last_s),
-        bst_custody_number(*sigma_m),
-        bst_custody_number(error_m),
-        bst_custody_number(*nees),
-        bst_custody_number(s->chi2_count > 0 ? s->chi2_sum / (double)s->chi2_count : NAN),
-        bst_custody_whole_number(object, true)};
-    return bst_io_table_append(ctx, c->objects, row);
+    const bst_custody_row row = {object, object, info->name, info->norad, *sigma_m, error_m, *nees};
+    return bst_run_custody_add_object(ctx, c->objects, &row, &c->scores[object], end_s);
 }
 
 bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s) {

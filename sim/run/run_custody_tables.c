@@ -1,6 +1,9 @@
 #include "sim/run/run_custody_tables.h"
 
+#include <math.h>
 #include <stdlib.h>
+
+#include "sim/core/compare.h"
 
 #define INT(name, unit, doc) \
     { name, BST_COLUMN_INT, unit, doc }
@@ -48,12 +51,33 @@ bst_status bst_run_custody_tables_create(bst_ctx *ctx, bst_run *store, bst_io_ta
                                objects);
 }
 
-static int compare(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
+void bst_custody_score_add(bst_custody_score *s, bool crossed, double chi2, double time_s) {
+    s->updates++;
+    s->cross_tags += crossed;
+    s->chi2_sum += chi2;
+    s->chi2_count++;
+    s->last_s = fmax(s->last_s, time_s); /* fmax ignores NAN */
+}
+
+bst_status bst_run_custody_add_object(bst_ctx *ctx, bst_io_table *table, const bst_custody_row *r,
+                                      const bst_custody_score *s, double end_s) {
+    const bst_io_value row[] = {
+        bst_io_known_int_value(r->object, r->object >= 0),
+        bst_io_text_value(r->name),
+        bst_io_int_value(r->norad),
+        bst_io_int_value(s->updates),
+        bst_io_int_value(s->cross_tags),
+        bst_io_real_value(s->last_s),
+        bst_io_real_value(end_s - s->last_s),
+        bst_io_real_value(r->sigma_m),
+        bst_io_real_value(r->error_m),
+        bst_io_real_value(r->nees),
+        bst_io_real_value(s->chi2_count > 0 ? s->chi2_sum / (double)s->chi2_count : NAN),
+        bst_io_known_int_value(r->true_object, r->true_object >= 0)};
+    return bst_io_table_append(ctx, table, row);
 }
 
 double bst_custody_quantile(double *values, int count, double share) {
-    qsort(values, (size_t)count, sizeof *values, compare);
+    qsort(values, (size_t)count, sizeof *values, bst_compare_doubles);
     return count > 0 ? values[(int)(share * (count - 1))] : NAN;
 }

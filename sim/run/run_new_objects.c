@@ -5,8 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/run/run_custody_tables.h"
-
 enum { MOST_OBJECTS = 1 << 16 };
 /* Chi-square of 6 degrees of freedom that errors as stated exceed with probability 2e-5, times 9
  * for errors three times as large. */
@@ -52,11 +50,10 @@ void bst_run_new_object_advance(bst_run_new_object *o, double time_s) {
 
 bool bst_run_new_object_is(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                            const bst_custody_orbit *other, const bst_custody_filter *other_filter,
-                           double time_s, double *chi2) {
+                           double time_s) {
     bst_vec3 r, v, place, unused;
     bst_custody_filter own, theirs;
     double sigma_m[2];
-    *chi2 = NAN;
     if (!bst_custody_state(orbit, filter->x, time_s, &r, &v) ||
         !bst_custody_state(other, other_filter->x, time_s, &place, &unused) ||
         !(bst_vec3_norm(bst_vec3_sub(place, r)) < REACH_M) ||
@@ -73,8 +70,7 @@ bool bst_run_new_object_is(const bst_custody_orbit *orbit, const bst_custody_fil
             theirs.p[i][k] += own.p[i][k];
         }
     }
-    *chi2 = bst_custody_nees(&theirs);
-    return *chi2 < MOST_CHI2;
+    return bst_custody_nees(&theirs) < MOST_CHI2;
 }
 
 bool bst_run_new_object_carry(const bst_custody_orbit *from, const bst_custody_filter *filter,
@@ -155,20 +151,8 @@ bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *n, cons
             sigmas[known++] = sigma;
         }
         (void)snprintf(name, sizeof name, "new %d", i + 1);
-        const bst_io_value row[] = {
-            bst_custody_whole_number(0, false),
-            {.type = BST_COLUMN_TEXT, .as.text = name},
-            bst_custody_whole_number(0, true),
-            bst_custody_whole_number(o->updates, true),
-            bst_custody_whole_number(o->cross_tags, true),
-            bst_custody_number(o->last_s),
-            bst_custody_number(end_s - o->last_s),
-            bst_custody_number(sigma),
-            bst_custody_number(error),
-            bst_custody_number(nees),
-            bst_custody_number(o->chi2_count > 0 ? o->chi2_sum / (double)o->chi2_count : NAN),
-            bst_custody_whole_number(o->true_object, o->true_object >= 0)};
-        status = table ? bst_io_table_append(ctx, table, row) : BST_OK;
+        const bst_custody_row row = {-1, o->true_object, name, 0, sigma, error, nees};
+        status = table ? bst_run_custody_add_object(ctx, table, &row, &o->score, end_s) : BST_OK;
     }
     out->sigma_median_m = sigmas ? bst_custody_quantile(sigmas, known, 0.5) : NAN;
     out->nees_mean = nees_count > 0 ? nees_sum / nees_count : NAN;
@@ -180,7 +164,7 @@ bst_status bst_run_new_objects_finish(bst_ctx *ctx, bst_run_new_objects *n, cons
 static bool is_possible(const bst_run_new_object *o) {
     const double e = o->orbit.elements.eccentricity;
     return fabs(o->orbit.epoch_offset_s) <= BST_OD_LONGEST_S && o->orbit.a_m > 0.0 && e >= 0.0 &&
-           e < 1.0 && isfinite(o->filter.noise_until_s) && isfinite(o->last_s);
+           e < 1.0 && isfinite(o->filter.noise_until_s) && isfinite(o->score.last_s);
 }
 
 bst_status bst_run_new_objects_archive(bst_run_new_objects *n, int world_objects,
@@ -197,7 +181,7 @@ bst_status bst_run_new_objects_archive(bst_run_new_objects *n, int world_objects
                             "before the epoch, allowed are %g; noise until %g s, updated at %g s)",
                             i + 1, o->orbit.a_m, o->orbit.elements.eccentricity,
                             o->orbit.epoch_offset_s, BST_OD_LONGEST_S, o->filter.noise_until_s,
-                            o->last_s);
+                            o->score.last_s);
         }
         o->true_object = bst_archive_integer(archive, o->true_object, -1, world_objects - 1);
     }

@@ -3,18 +3,15 @@
 #define BST_RUN_RUN_NEW_OBJECTS_H
 
 #include "boresight/archive.h"
-#include "sim/io/run_store.h"
+#include "sim/run/run_custody_tables.h"
 #include "sim/world/world.h"
 #include "tracker/orbit/custody.h"
 
 typedef struct bst_run_new_object {
     bst_custody_orbit orbit;
     bst_custody_filter filter;
-    double noise_m_per_day;      /* of its process noise, for its unknown drag */
-    int64_t updates, cross_tags; /* tracks, with those of its candidate; of another object */
-    double last_s;               /* last of them */
-    double chi2_sum;             /* of the tracks since then */
-    int64_t chi2_count;
+    double noise_m_per_day;  /* of its process noise, for its unknown drag */
+    bst_custody_score score; /* updates: with the tracks of its candidate */
     /* by the truth: object that all tracks of its candidate belong to, -1: different ones, none */
     int64_t true_object;
 } bst_run_new_object;
@@ -44,12 +41,10 @@ void bst_run_new_object_advance(bst_run_new_object *object, double time_s);
 /* Whether two orbits with filters are those of one object at `time_s`: the squared difference of
  * their elements by the sum of both covariances is that of errors up to three times as large as
  * stated, and the standard deviation of the difference of places is at most 5 km, as otherwise
- * neighbours would be one.
- *
- * Returned:  *chi2  of the difference, 6 degrees of freedom; NAN: none */
+ * neighbours would be one. */
 bool bst_run_new_object_is(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                            const bst_custody_orbit *other, const bst_custody_filter *other_filter,
-                           double time_s, double *chi2);
+                           double time_s);
 
 /* Filter of a catalogued object that starts anew on the orbit of another one, which is within some
  * kilometres of it: differences of osculating elements at `time_s` are taken for those of mean

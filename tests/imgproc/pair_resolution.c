@@ -1,6 +1,6 @@
 /* Pairs that are found as two, and single sources that are split.
  *
- * Usage: test_imgproc_pair_resolution runs a test; with NAME=VALUE ..., the names of `arguments`
+ * Usage: test_imgproc_pair_resolution runs a test; with NAME=VALUE ..., those of read_arguments
  * below, it prints the share of single sources that are split over their SNR. A fifth of the
  * sources of a frame are pairs, of random direction and pixel phase. SNR is that of both lights
  * together, as one source. `boresight pd --pair` measures the separations. */
@@ -27,9 +27,11 @@ static void read_arguments(int argc, char **argv, arguments *a) {
     struct {
         const char *name;
         double *value;
-    } all[] = {{"frames=", &a->frames}, {"ratio=", &a->ratio},
-               {"streak=", &a->streak}, {"false_splits=", &a->false_splits},
-               {"moving=", &a->moving}, {"snr=", &a->snr}};
+    } all[] = {{"frames=", &a->frames},
+               {"streak=", &a->streak},
+               {"false_splits=", &a->false_splits},
+               {"moving=", &a->moving},
+               {"snr=", &a->snr}};
     for (int i = 1; i < argc; i++) {
         for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
             size_t n = strlen(all[k].name);

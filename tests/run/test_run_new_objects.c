@@ -250,7 +250,7 @@ static void saved_orbits_are_possible(void **state) {
         o->orbit.a_m = hostile[i][1];
         o->orbit.elements.eccentricity = hostile[i][2];
         o->filter.noise_until_s = hostile[i][3];
-        o->last_s = hostile[i][4];
+        o->score.last_s = hostile[i][4];
         bst_assert_ok(&ctx, bst_archive_create(&ctx, &damaged));
         bst_assert_ok(&ctx, bst_archive_begin(&ctx, damaged, "it"));
         assert_int_equal(archive_saved(&self, damaged), BST_ERR_FORMAT);

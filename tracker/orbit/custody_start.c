@@ -51,6 +51,16 @@ static void distances(double a_m, const double at[N], const double from[N], doub
     }
 }
 
+/* Adds what a column of a covariance's root adds to that of the distances: half the difference of
+ * both sides, squared. */
+static void add_column(const double sides[N], double p[N][N]) {
+    for (int i = 0; i < N; i++) {
+        for (int j = 0; j < N; j++) {
+            p[i][j] += 0.25 * sides[i] * sides[j];
+        }
+    }
+}
+
 bool bst_custody_difference(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                             double time_s, bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps,
                             bst_custody_filter *out) {
@@ -77,11 +87,7 @@ bool bst_custody_difference(const bst_custody_orbit *orbit, const bst_custody_fi
             }
         }
         distances(orbit->a_m, side[0], side[1], column);
-        for (int i = 0; i < N; i++) {
-            for (int j = 0; j < N; j++) {
-                out->p[i][j] += 0.25 * column[i] * column[j];
-            }
-        }
+        add_column(column, out->p);
     }
     return true;
 }
@@ -129,11 +135,7 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
         }
         distances(orbit->a_m, side[0], side[1], column);
         column[BST_CUSTODY_ALONG] -= column[BST_CUSTODY_DRIFT] * fix->time_s / BST_DAY_S;
-        for (int i = 0; i < N; i++) {
-            for (int j = 0; j < N; j++) {
-                filter->p[i][j] += 0.25 * column[i] * column[j];
-            }
-        }
+        add_column(column, filter->p);
     }
     filter->noise_until_s = fix->time_s;
     return true;
