@@ -13,14 +13,15 @@ enum { POINT_CANDIDATES = 3000 };
 static const double POINT_PX = 4.0;
 /* Share of a streak in the frame from which on a star is used. */
 static const double LEAST_INSIDE = 0.25;
-/* Streaks are of one length within this. */
-static const double SAME_PX = 1.5;
+/* Streaks are of one length within this: their middle moves by half of it. */
+static const double SAME_PX = 4.0;
 /* Least log-likelihood of a streak's ends over that of ends elsewhere: one wrong in 3000. */
 static const double LEAST_MARGIN = 8.0;
+/* The identified stars must vote against other ends. Where they do so by CLEAR_VOTES, the margin
+ * may be LESS_MARGIN; by CERTAIN_VOTES, it does not matter. */
+static const double CLEAR_VOTES = -1.0, LESS_MARGIN = 4.0, CERTAIN_VOTES = -3.0;
 /* Stars above this SNR measure the path of a solved frame even if the catalogue lacks them. */
 static const double BRIGHT_SNR = 10.0;
-/* Likelihood ratios whose logarithms differ by less than this are the same. */
-static const double SAME_RATIO = 2.0;
 /* Logarithm of the chance of the best candidate below which the frame may be solved by a better
  * path. */
 static const double NEARLY = -8.0;
@@ -95,12 +96,28 @@ static bst_status solve_path(attempt *a, const bst_star_path *path, int candidat
     return solve_middles(a, candidates, NULL, out);
 }
 
+/* True if the ends of a solved frame's streaks are where its stars' light ends. All stars that
+ * measured the path give the margin of its ends. Pieces of streaks may be among them, which would
+ * keep a path that is too short, and light of others where a streak ends: those of the catalogue
+ * have votes. */
+static bool is_certain(const attempt *a) {
+    bool chosen[BST_PLATE_SOLVE_STARS];
+    for (int i = 0; i < a->streak.count; i++) {
+        chosen[i] = bst_lost_in_space_matched(a->lost, i);
+    }
+    const double votes = bst_streak_finder_votes(a->finder, chosen, &a->streak);
+    const double margin = a->streak.ends_margin;
+    return votes < CERTAIN_VOTES || (votes < CLEAR_VOTES && margin > LESS_MARGIN) ||
+           (votes < 0.0 && margin > LEAST_MARGIN);
+}
+
 /* Measures the path on the identified stars and solves again.
  *
  * Given:     bright  also on bright stars that the catalogue lacks
- * Returned:  *settled  the streak has kept its length */
+ * Returned:  *certain  the frame is solved, and the streak has kept its length and has certain
+ *                      ends */
 static bst_status improve_once(attempt *a, bool bright, bst_lost_in_space_result *out,
-                               bool *settled) {
+                               bool *certain) {
     bool chosen[BST_PLATE_SOLVE_STARS];
     const double before = length_px(&a->streak);
     const bst_lost_in_space_result near = *out;
@@ -111,44 +128,35 @@ static bst_status improve_once(attempt *a, bool bright, bst_lost_in_space_result
     BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
     BST_TRY((a->joint ? solve_together : solve_middles)(a, BST_LOST_IN_SPACE_USUAL.max_candidates,
                                                         &near, out));
-    *settled = fabs(length_px(&a->streak) - before) < SAME_PX;
+    *certain =
+        out->solved && fabs(length_px(&a->streak) - before) < SAME_PX && is_certain(a);
     return BST_OK;
 }
 
-/* Improves the path until the streak keeps its length.
+/* Improves the path until its ends are certain; the frame is not solved if they never are.
  *
- * Given:     bright  from the beginning also on stars that the catalogue lacks; they always help a
- *                    path that has settled
- * Returned:  *best   greatest logarithm of the likelihood ratio so far */
-static bst_status improve_by(attempt *a, bool bright, bst_lost_in_space_result *out, double *best) {
-    bool settled = false;
-    for (int pass = 0; pass < PASSES && out->solved && !settled; pass++) {
-        BST_TRY(improve_once(a, bright, out, &settled));
-        *best = out->solved ? fmax(*best, -out->log_chance) : *best;
+ * Given:     bright  from the beginning also on stars that the catalogue lacks */
+static bst_status improve_by(attempt *a, bool bright, bst_lost_in_space_result *out) {
+    bool certain = false;
+    for (int pass = 0; pass < PASSES && out->solved && !certain; pass++) {
+        BST_TRY(improve_once(a, bright || pass == PASSES - 1, out, &certain));
     }
-    if (out->solved && settled && !bright && !(a->streak.ends_margin > LEAST_MARGIN)) {
-        BST_TRY(improve_once(a, true, out, &settled));
-    }
-    out->solved = out->solved && settled && a->streak.ends_margin > LEAST_MARGIN &&
-                  -out->log_chance > *best - SAME_RATIO;
+    out->solved = certain;
     return BST_OK;
 }
 
-/* Improves the path of a solved frame. If the streak never keeps its length, or its ends are not
- * certain then, they may lie in the light of other stars, with the middle of the exposure in the
- * wrong place: such a frame is not solved. The identified stars measure the path first. To a path
- * that is too short, each half of a streak is a star, and such stars would keep it so: a path by
- * all bright stars must not fit worse than those before. */
+/* Improves the path of a solved frame. If the ends of its streaks are never certain, they may lie
+ * in the light of other stars, with the middle of the exposure in the wrong place: such a frame is
+ * not solved. The identified stars measure the path first, then all bright ones. */
 static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
     const bst_star_path path = *bst_streak_finder_path(a->finder);
     const bst_lost_in_space_result first = *out;
-    double best = -first.log_chance;
-    BST_TRY(improve_by(a, false, out, &best));
+    BST_TRY(improve_by(a, false, out));
     if (!out->solved) {
         BST_TRY(bst_streak_finder_search(a->ctx, a->finder, &path, &a->streak));
         BST_TRY((a->joint ? solve_together : solve_middles)(
             a, BST_LOST_IN_SPACE_USUAL.max_candidates, &first, out));
-        BST_TRY(improve_by(a, true, out, &best));
+        BST_TRY(improve_by(a, true, out));
     }
     return BST_OK;
 }

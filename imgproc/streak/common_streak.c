@@ -386,18 +386,25 @@ static double overlap(const finder *f) {
     return sum;
 }
 
-/* Improves the path by stars. */
-static void refine_path(finder *f, const bst_common_streak *found, const bool *chosen) {
-    const bst_star_path_image image = image_of(f);
-    bst_star_path_star stars[REFINING_STARS];
+/* Lists chosen stars; NULL: all. Returns their number. */
+static int choose_stars(const finder *f, const bst_common_streak *found, const bool *chosen,
+                        bst_star_path_star *stars, int most) {
     const double light = overlap(f);
     int count = 0;
-    for (int i = 0; i < found->count && count < REFINING_STARS; i++) {
+    for (int i = 0; i < found->count && count < most; i++) {
         if (!chosen || chosen[i]) {
             stars[count++] = (bst_star_path_star){found->items[i].x_px, found->items[i].y_px,
                                                   found->items[i].flux_e / f->sigma * light};
         }
     }
+    return count;
+}
+
+/* Improves the path by stars. */
+static void refine_path(finder *f, const bst_common_streak *found, const bool *chosen) {
+    const bst_star_path_image image = image_of(f);
+    bst_star_path_star stars[REFINING_STARS];
+    int count = choose_stars(f, found, chosen, stars, REFINING_STARS);
     bst_star_path_refine(&f->path, &image, stars, count);
 }
 
@@ -510,6 +517,17 @@ bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *f, const bo
     assert(f && chosen && out);
     refine_path(f, out, chosen);
     return find_all(ctx, f, out);
+}
+
+double bst_streak_finder_votes(bst_streak_finder *f, const bool *chosen,
+                               const bst_common_streak *found) {
+    assert(f && chosen && found);
+    const bst_star_path_image image = image_of(f);
+    bst_star_path_star stars[BST_STAR_PATH_VOTERS];
+    double votes[2];
+    int count = choose_stars(f, found, chosen, stars, BST_STAR_PATH_VOTERS);
+    bst_star_path_vote(&f->path, &image, stars, count, votes);
+    return fmax(votes[0], votes[1]);
 }
 
 const bst_star_path *bst_streak_finder_path(const bst_streak_finder *f) {

@@ -92,6 +92,14 @@ bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *finder, int i
 bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *finder, const bool *chosen,
                                     bst_common_streak *out) BST_MUST_CHECK;
 
+/* Asks chosen stars of the latest search whether their light ends where the path does: see
+ * bst_star_path_vote.
+ *
+ * Given:     chosen  [found->count] stars that are surely right
+ * Returned:  greatest logarithm of the likelihood of another end over that of the path's */
+double bst_streak_finder_votes(bst_streak_finder *finder, const bool *chosen,
+                               const bst_common_streak *found);
+
 /* Path of the latest search; it belongs to the finder. */
 const bst_star_path *bst_streak_finder_path(const bst_streak_finder *finder);
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/streak/star_path_internal.h"
 #include "sim/core/symmetric.h"
 
 enum { DEGREE = 4, TERMS = DEGREE + 1, BEYOND = 12, MOST_STARS = 15, ACROSS = 3 };
@@ -17,16 +18,7 @@ static const double LEAST_SAMPLE = 2.0;
 /* Light of a sample, over that of the path, below which it has no place of its own. */
 static const double LEAST_LIGHT = 1.0;
 /* Samples by which ends may differ and be the same. */
-enum { SAME_END = 4 };
-/* Share of samples with light of another star, and the range of that light, in units of the image's
- * noise. */
-static const double CROWDED = 0.2, OTHER_RANGE = 10.0;
-/* Unevenness of a star's light along its streak, 1 sigma. Dark samples have it, too, by the wings
- * of the PSF: an end then lies where the light has fallen to half. */
-static const double UNEVEN = 0.25;
-/* Neighbouring samples share noise: so many count as one (exp(-1) at a distance of two sigma). */
-static const double CORRELATED = 1.7;
-static const double ROOT_2PI = 2.5066282746310002;
+enum { SAME_END = BST_STAR_PATH_SAME_END };
 /* Largest correction of the centre line, px. */
 static const double MOST_SHIFT_PX = 2.0;
 
@@ -358,28 +350,14 @@ static double light_at(const bst_star_path *path, const bst_star_path_image *ima
     return 0.0;
 }
 
-/* Evidence that a place of the path is lit: log-likelihood over that of a dark one, in the light of
- * all stars together. A star's sample may hold another star's light with the probability
- * CROWDED, whether it is lit or not: single stars cannot move an end. */
+/* Evidence that a place of the path is lit, in the light of all stars together. */
 static double evidence_at(const bst_star_path *path, const bst_star_path_image *image,
                           const bst_star_path_star *stars, int count, const double place[2]) {
     double sum = 0.0;
     for (int i = 0; i < count; i++) {
-        double m[3], a = stars[i].amplitude;
-        bst_star_path_map(path, stars[i].x_px, stars[i].y_px, m);
-        double x = stars[i].x_px + m[0] * place[0] + m[1] * place[1];
-        double y = stars[i].y_px + m[1] * place[0] + m[2] * place[1];
-        if (x < 0.0 || y < 0.0 || x >= image->width - 1 || y >= image->height - 1) {
-            continue;
-        }
-        double v = bst_star_path_image_at(image, x, y), spread = hypot(1.0, UNEVEN * a);
-        double other = CROWDED / (OTHER_RANGE + 4.0 * a);
-        double lit = exp(-0.5 * (v - a) * (v - a) / (spread * spread)) / spread;
-        double dark = exp(-0.5 * v * v / (spread * spread)) / spread;
-        sum += log(((1.0 - CROWDED) / ROOT_2PI * lit + other) /
-                   ((1.0 - CROWDED) / ROOT_2PI * dark + other));
+        sum += bst_star_path_evidence(path, image, &stars[i], place);
     }
-    return sum / CORRELATED;
+    return sum;
 }
 
 /* Place of a sample, counted from the path's first and extrapolated beyond its ends; its normal. */

@@ -83,4 +83,17 @@ typedef struct bst_star_path_star {
 void bst_star_path_refine(bst_star_path *path, const bst_star_path_image *image,
                           const bst_star_path_star *stars, int count);
 
+/* Most stars that vote. */
+enum { BST_STAR_PATH_VOTERS = 64 };
+
+/* Asks stars that are surely right whether their light ends where the path does.
+ *
+ * Each star has one vote of at most ln 4, however bright it is: another's light may lie along its
+ * streak. The path is continued along a parabola through it, and a little to both sides.
+ *
+ * Returned:  votes  for each end the greatest logarithm of the likelihood of one more than 8 px
+ *                   away, up to half the path, over that of this one; -HUGE_VAL: a point */
+void bst_star_path_vote(const bst_star_path *path, const bst_star_path_image *image,
+                        const bst_star_path_star *stars, int count, double votes[2]);
+
 #endif

@@ -1,0 +1,138 @@
+/* Votes of identified stars on the ends of their path. */
+#include <assert.h>
+#include <math.h>
+
+#include "imgproc/streak/star_path_internal.h"
+
+/* Share of samples with light of another star, and the range of that light, in units of the image's
+ * noise. */
+static const double CROWDED = 0.2, OTHER_RANGE = 10.0;
+/* Unevenness of a star's light along its streak, 1 sigma. Dark samples have it, too, by the wings
+ * of the PSF: an end then lies where the light has fallen to half. */
+static const double UNEVEN = 0.25;
+/* Neighbouring samples share noise: so many count as one (exp(-1) at a distance of two sigma). */
+static const double CORRELATED = 1.7;
+static const double ROOT_2PI = 2.5066282746310002;
+/* Most samples by which an end is moved, as a share of the path's. */
+static const double MOVED_SHARE = 0.5;
+/* Continuations of the path: so many on either side of the smoothest, each FAN_SLOPE px further out
+ * for each px beyond the end. */
+enum { FAN = 2 };
+static const double FAN_SLOPE = 0.06;
+/* Probability that a star has another one's light along its continuation. */
+static const double CROSSED = 0.2;
+
+double bst_star_path_evidence(const bst_star_path *path, const bst_star_path_image *image,
+                              const bst_star_path_star *star, const double place[2]) {
+    double m[3], a = star->amplitude;
+    bst_star_path_map(path, star->x_px, star->y_px, m);
+    double x = star->x_px + m[0] * place[0] + m[1] * place[1];
+    double y = star->y_px + m[1] * place[0] + m[2] * place[1];
+    if (x < 0.0 || y < 0.0 || x >= image->width - 1 || y >= image->height - 1) {
+        return 0.0;
+    }
+    double v = bst_star_path_image_at(image, x, y), spread = hypot(1.0, UNEVEN * a);
+    double other = CROWDED / (OTHER_RANGE + 4.0 * a);
+    double lit = exp(-0.5 * (v - a) * (v - a) / (spread * spread)) / spread;
+    double dark = exp(-0.5 * v * v / (spread * spread)) / spread;
+    return log(((1.0 - CROWDED) / ROOT_2PI * lit + other) /
+               ((1.0 - CROWDED) / ROOT_2PI * dark + other)) /
+           CORRELATED;
+}
+
+/* Parabola through the samples of the path, in t from -1 to 1 along it, by least squares. */
+static void fit_parabola(const bst_star_path *p, double c[2][3]) {
+    double s2 = 0.0, s4 = 0.0, g[2][3] = {{0}};
+    const double half = 0.5 * (p->count - 1);
+    for (int k = 0; k < p->count; k++) {
+        double t = (k - half) / half;
+        s2 += t * t;
+        s4 += t * t * t * t;
+        for (int i = 0; i < 2; i++) {
+            g[i][0] += p->place[k][i];
+            g[i][1] += t * p->place[k][i];
+            g[i][2] += t * t * p->place[k][i];
+        }
+    }
+    const double n = p->count, det = n * s4 - s2 * s2;
+    for (int i = 0; i < 2; i++) {
+        c[i][0] = (s4 * g[i][0] - s2 * g[i][2]) / det;
+        c[i][1] = g[i][1] / s2;
+        c[i][2] = (n * g[i][2] - s2 * g[i][0]) / det;
+    }
+}
+
+/* Place of a sample beyond an end on one of the continuations.
+ *
+ * Given:     c       of the parabola
+ *            end     0 or 1
+ *            beyond  samples beyond the last, negative: inside
+ *            fan     number of the continuation */
+static void continued_place(const bst_star_path *p, double c[2][3], int end, int beyond, int fan,
+                            double place[2]) {
+    const double half = 0.5 * (p->count - 1), sign = end ? 1.0 : -1.0;
+    const int last = end ? p->count - 1 : 0;
+    if (beyond <= 0) {
+        place[0] = p->place[last + (end ? beyond : -beyond)][0];
+        place[1] = p->place[last + (end ? beyond : -beyond)][1];
+        return;
+    }
+    double t = sign * (1.0 + beyond / half), tangent[2];
+    for (int i = 0; i < 2; i++) {
+        place[i] = c[i][0] + t * (c[i][1] + t * c[i][2]);
+        tangent[i] = c[i][1] + 2.0 * t * c[i][2];
+    }
+    double length = fmax(hypot(tangent[0], tangent[1]), 1e-9);
+    double across = fan * FAN_SLOPE * beyond * BST_STAR_PATH_STEP_PX;
+    place[0] -= across * tangent[1] / length;
+    place[1] += across * tangent[0] / length;
+}
+
+/* Log-likelihood of a star for another end over this one, if other stars' light may cause it. */
+static double vote(double evidence) {
+    double e = fmax(fmin(evidence, 50.0), -50.0);
+    return log(((1.0 - CROSSED) * exp(e) + CROSSED) / ((1.0 - CROSSED) + CROSSED * exp(e)));
+}
+
+/* Greatest sum of votes for an end further out (step 1) or further in (step -1).
+ *
+ * Returned:  *at  samples by which that end is further out */
+static double most_votes(const bst_star_path *p, const bst_star_path_image *image,
+                         const bst_star_path_star *stars, int count, double c[2][3], int end,
+                         int step, int fan, int *at) {
+    double evidence[BST_STAR_PATH_VOTERS] = {0}, best = -HUGE_VAL;
+    const int most = (int)(MOVED_SHARE * p->count);
+    for (int k = 1; k <= most; k++) {
+        double place[2], sum = 0.0;
+        continued_place(p, c, end, step > 0 ? k : 1 - k, fan, place);
+        for (int i = 0; i < count; i++) {
+            evidence[i] += step * bst_star_path_evidence(p, image, &stars[i], place);
+            sum += vote(evidence[i]);
+        }
+        if (k > BST_STAR_PATH_SAME_END && sum > best) {
+            best = sum;
+            *at = step * k;
+        }
+    }
+    return best;
+}
+
+void bst_star_path_vote(const bst_star_path *path, const bst_star_path_image *image,
+                        const bst_star_path_star *stars, int count, double votes[2]) {
+    assert(path && image && stars && count >= 0 && votes);
+    double c[2][3];
+    votes[0] = votes[1] = -HUGE_VAL;
+    if (path->count < 3) {
+        return;
+    }
+    count = count < BST_STAR_PATH_VOTERS ? count : BST_STAR_PATH_VOTERS;
+    fit_parabola(path, c);
+    for (int end = 0; end < 2; end++) {
+        int at;
+        votes[end] = most_votes(path, image, stars, count, c, end, -1, 0, &at);
+        for (int fan = -FAN; fan <= FAN; fan++) {
+            votes[end] =
+                fmax(votes[end], most_votes(path, image, stars, count, c, end, 1, fan, &at));
+        }
+    }
+}
