@@ -41,6 +41,12 @@ static const double LEAST_SHARE = 0.35;
  * a chi-square below c with a probability that grows with c^2. The error is added to that of each
  * place: distortion and neighbours. */
 static const double MOST_CHI_SQUARED = 28.5, QUAD_PX = 0.3;
+/* Share of right candidates, of matched places and of brightnesses that may be as by chance. */
+static const double UNUSUAL = 0.2;
+/* Magnitudes of detections differ by so much from those of their stars: colours, neighbours. */
+static const double MAG_SIGMA = 0.4;
+/* Least stars of the quad that give the zero point of magnitudes. */
+enum { LEAST_ZERO_STARS = 3 };
 /* Least share of a streak inside the window, for a star to be predicted. */
 static const double LEAST_INSIDE = 0.25;
 /* Error of a quad's own scale. */
@@ -51,6 +57,7 @@ typedef struct source {
     double x_px, y_px;
     double cov_xx, cov_xy, cov_yy; /* of the place, px^2 */
     bst_vec3 cam;                  /* unit, by the camera's own scale */
+    double mag;                    /* of its flux, without a zero point */
 } source;
 
 struct bst_lost_in_space {
@@ -73,6 +80,7 @@ struct bst_lost_in_space {
     bst_star *found;      /* [MOST_PREDICTED] */
     bst_star_fit_pair *expected; /* [MOST_PREDICTED] */
     double *found_share;         /* [MOST_PREDICTED] probability that each is detected */
+    double *v_mag;               /* [MOST_PREDICTED] */
     bst_star_fit_pair *matched;  /* [MOST_PREDICTED] */
 };
 
@@ -87,6 +95,7 @@ static void lay_out(bst_lost_in_space *s) {
     BST_ARENA_TAKE(&s->arena, s->found, MOST_PREDICTED);
     BST_ARENA_TAKE(&s->arena, s->expected, MOST_PREDICTED);
     BST_ARENA_TAKE(&s->arena, s->found_share, MOST_PREDICTED);
+    BST_ARENA_TAKE(&s->arena, s->v_mag, MOST_PREDICTED);
     BST_ARENA_TAKE(&s->arena, s->matched, MOST_PREDICTED);
 }
 
@@ -153,7 +162,8 @@ static void read_sources(bst_lost_in_space *s, const bst_lost_in_space_frame *fr
                                  .cov_xx = fmax(d->cov_xx, 0.0) + least,
                                  .cov_xy = d->cov_xy,
                                  .cov_yy = fmax(d->cov_yy, 0.0) + least,
-                                 .cam = bst_camera_unproject(s->camera, d->x_px, d->y_px)};
+                                 .cam = bst_camera_unproject(s->camera, d->x_px, d->y_px),
+                                 .mag = -2.5 * log10(fmax(d->flux_e, 1e-9))};
     }
     s->count = count;
 }
@@ -266,6 +276,7 @@ static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count)
         e->gcrf = bst_light_apparent_star(a->frame->light, s->found[i].icrs);
         if (bst_star_fit_project(fit, s->camera, e->gcrf, &e->x_px, &e->y_px) &&
             beyond_limit(a, &s->found[i], e, &beyond_mag)) {
+            s->v_mag[*count] = (double)s->found[i].v_mag;
             s->found_share[(*count)++] = found_share_of(beyond_mag);
         }
     }
@@ -342,10 +353,52 @@ static bool is_of(const int quad[4], int i) {
     return i == quad[0] || i == quad[1] || i == quad[2] || i == quad[3];
 }
 
+/* Zero point of the detections' magnitudes by the quad's stars, or by all without a quad; NAN:
+ * unknown. */
+static double zero_point(const bst_lost_in_space *s, const int quad[4], int sources) {
+    double sum = 0.0;
+    int count = 0;
+    for (int i = 0; i < sources; i++) {
+        if (s->star_of[i] >= 0 && (quad[0] < 0 || is_of(quad, i))) {
+            sum += s->v_mag[s->star_of[i]] - s->sources[i].mag;
+            count++;
+        }
+    }
+    return count >= LEAST_ZERO_STARS ? sum / count : NAN;
+}
+
+/* Probability that a star that is detected is a certain one of the detections beside the quad's,
+ * by its brightness.
+ *
+ * Given:     zero_mag  NAN: all are equally probable */
+static double share_of_detection(const bst_lost_in_space *s, const int quad[4], int sources,
+                                 double zero_mag, int i) {
+    double sum = 0.0, own = 0.0;
+    int others = 0;
+    for (int j = 0; j < sources; j++) {
+        if (!is_of(quad, j)) {
+            double d = (s->v_mag[s->star_of[i]] - s->sources[j].mag - zero_mag) / MAG_SIGMA;
+            double fits = isnan(zero_mag) ? 1.0 : exp(-0.5 * d * d);
+            sum += fits;
+            own = j == i ? fits : own;
+            others++;
+        }
+    }
+    return (sum > 0.0 ? (1.0 - UNUSUAL) * own / sum : 0.0) + UNUSUAL / others;
+}
+
+/* Density of a star's place in the ellipse of its detection, over that of even spread: a normal one
+ * that is cut off at LAST_SIGMAS. */
+static double density_of(double distance2) {
+    const double k = 0.5 * LAST_SIGMAS * LAST_SIGMAS;
+    return (1.0 - UNUSUAL) * k * exp(-k * distance2) / (1.0 - exp(-k)) + UNUSUAL;
+}
+
 /* Weighs a match of predicted stars: the likelihood of the detections if the attitude is right,
- * over that if they are spread evenly. A star is in the ellipse of a detection with its probability
- * of being detected, or by chance. The quad's own detections do not count, nor do stars that are
- * as probable by chance.
+ * over that if they are spread evenly. A star is detected with its probability; it is then the
+ * detection with which it is matched with a probability by brightness, and lies in its ellipse. By
+ * chance it lies there as in any place. The quad's own detections do not count, nor do stars that
+ * are as probable by chance.
  *
  * Returned:  out->predicted, matched  those up to the frame's limit
  *            logarithm of the ratio. By the null model its mean is 1, so that it exceeds R with a
@@ -353,6 +406,7 @@ static bool is_of(const int quad[4], int i) {
 static double log_ratio(const attempt *a, const int quad[4], int predicted, int sources,
                         bst_lost_in_space_result *out) {
     bst_lost_in_space *s = a->s;
+    const double zero_mag = zero_point(s, quad, sources);
     double area_px2 = 0.0, sum = 0.0;
     out->predicted = out->matched = 0;
     for (int i = 0; i < sources; i++) {
@@ -364,12 +418,17 @@ static double log_ratio(const attempt *a, const int quad[4], int predicted, int 
         sum += s->found_share[k] > chance ? log((1.0 - s->found_share[k]) / (1.0 - chance)) : 0.0;
     }
     for (int i = 0; i < sources; i++) {
-        if (s->star_of[i] >= 0) {
-            double share = s->found_share[s->star_of[i]];
-            out->matched += share >= SURELY_FOUND;
-            if (share > chance) {
-                double missed = log((1.0 - share) / (1.0 - chance));
-                sum += (is_of(quad, i) ? 0.0 : log(share / chance)) - missed;
+        if (s->star_of[i] < 0) {
+            continue;
+        }
+        const double share = s->found_share[s->star_of[i]];
+        out->matched += share >= SURELY_FOUND;
+        if (share > chance) {
+            sum -= log((1.0 - share) / (1.0 - chance));
+            if (!is_of(quad, i)) {
+                double own = fmax(s->area_px2[i] / a->area_px2, LEAST_CHANCE);
+                sum += log(share * density_of(s->nearest2[i]) / own *
+                           share_of_detection(s, quad, sources, zero_mag, i));
             }
         }
     }
@@ -382,13 +441,17 @@ static double log_ratio(const attempt *a, const int quad[4], int predicted, int 
  *            tolerance  of the first match, px */
 static bst_status verify(const attempt *a, bst_star_fit fit, const int quad[4], double tolerance,
                          bst_lost_in_space_result *out) {
+    /* a quad fits by chance with a chi-square whose square is evenly spread */
+    const double prior = quad[0] < 0 ? 0.0 : log((1.0 - UNUSUAL) * 0.125 * MOST_CHI_SQUARED *
+                                                 MOST_CHI_SQUARED * exp(-0.5 * fit.chi_squared) +
+                                             UNUSUAL);
     double evidence = 0.0;
     int predicted, sources, matched;
     for (int pass = 0; pass < PASSES; pass++) {
         BST_TRY(predict(a, &fit, &predicted));
         sources = rivals(a->s, predicted);
         matched = match(a, predicted, sources, tolerance);
-        evidence = log_ratio(a, quad, predicted, sources, out);
+        evidence = prior + log_ratio(a, quad, predicted, sources, out);
         if (pass == 0 || pass == PASSES - 1) {
             out->least_log_chance = fmin(out->least_log_chance, log(out->candidates) - evidence);
         }
