@@ -194,6 +194,59 @@ static void light_beyond_an_end(void **state) {
     }
 }
 
+/* Path of a curve's part, to vote on; the stars' amplitudes. */
+static bst_star_path part_of_curve(double from, double to, bst_star_path_star *stars, int count,
+                                   const double (*at)[2], const double *amplitudes) {
+    static int pixels[WIDE * HIGH];
+    bst_star_path p = {.centre = {MIDDLE_X, MIDDLE_Y}, .tangent_per_px = 1e-6};
+    double x, y;
+    memset(image, 0, sizeof image);
+    draw_part(at[0][0], at[0][1], from, to, 30.0);
+    assert_true(bst_star_path_fit(&p, &picture, pixels, above(5.0, pixels), &x, &y));
+    for (int i = 0; i < count; i++) {
+        stars[i] = (bst_star_path_star){x + at[i][0] - at[0][0], y + at[i][1] - at[0][1],
+                                        amplitudes[i]};
+    }
+    return p;
+}
+
+/* Identified stars vote on the ends of a path: against others where their light ends, whatever lies
+ * beyond a bright one; for others if the path is a piece of their streaks, or longer than they. */
+static void votes_on_the_ends(void **state) {
+    (void)state;
+    enum { STARS = 6 };
+    static const double at[STARS][2] = {{62, 46},  {30, 25}, {115, 90},
+                                        {110, 25}, {40, 85}, {80, 70}};
+    static const double amplitudes[STARS] = {30.0, 5.0, 5.0, 4.0, 4.0, 3.0};
+    /* the path's end, and those of the streaks */
+    static const double ends[][2] = {{0.5, 0.5}, {0.2, 0.5}, {0.5, 0.2}, {0.2, 0.2}};
+    bst_star_path_star stars[STARS];
+    for (int i = 0; i < 4; i++) {
+        bst_star_path p = part_of_curve(-0.5, ends[i][0], stars, STARS, at, amplitudes);
+        double votes[2];
+        memset(image, 0, sizeof image);
+        for (int k = 0; k < STARS; k++) {
+            draw_part(at[k][0], at[k][1], -0.5, ends[i][1], amplitudes[k]);
+        }
+        if (i == 3) { /* another star's light */
+            draw_part(at[0][0], at[0][1], 0.2, 0.5, 60.0);
+        }
+        bst_star_path_vote(&p, &picture, stars, STARS, votes);
+        print_message("path to %.1f, light to %.1f: votes %.1f and %.1f\n", ends[i][0], ends[i][1],
+                      votes[0], votes[1]);
+        if (i == 1 || i == 2) { /* ln 4 of each star, and one may be in doubt */
+            assert_true(fmax(votes[0], votes[1]) > (STARS - 1) * log(4.0));
+        } else {
+            assert_true(fmax(votes[0], votes[1]) < -(STARS - 3) * log(4.0));
+        }
+        assert_true(fmin(votes[0], votes[1]) < -(STARS - 2) * log(4.0));
+    }
+    bst_star_path point = {.count = 1};
+    double votes[2];
+    bst_star_path_vote(&point, &picture, stars, STARS, votes);
+    assert_true(isinf(votes[0]) && votes[0] < 0.0 && isinf(votes[1]) && votes[1] < 0.0);
+}
+
 /* The path of one star, and that of several from a worse start, on all four sides. */
 static void path_of_stars(void **state) {
     (void)state;
@@ -429,7 +482,7 @@ static void a_point_beside_a_star(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(map_of_a_turn),  cmocka_unit_test(between_pixels),
-        cmocka_unit_test(path_of_stars),  cmocka_unit_test(light_beyond_an_end),
+        cmocka_unit_test(path_of_stars),  cmocka_unit_test(light_beyond_an_end), cmocka_unit_test(votes_on_the_ends),
         cmocka_unit_test(point_source),   cmocka_unit_test(two_stars),
         cmocka_unit_test(over_the_edges), cmocka_unit_test(a_point_beside_a_star),
     };
