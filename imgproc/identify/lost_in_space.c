@@ -387,6 +387,29 @@ static double share_of_detection(const bst_lost_in_space *s, const int quad[4], 
     return (sum > 0.0 ? (1.0 - UNUSUAL) * own / sum : 0.0) + UNUSUAL / others;
 }
 
+/* Likelihood of the brightnesses of the quad's stars over its mean over all their permutations,
+ * which are equally probable by chance; the zero point is the same for all. */
+static double brightness_of_quad(const bst_lost_in_space *s, const int quad[4]) {
+    double v[4], sum = 0.0;
+    for (int i = 0; i < 4; i++) {
+        if (quad[i] < 0 || s->star_of[quad[i]] < 0) {
+            return 1.0;
+        }
+        v[i] = s->v_mag[s->star_of[quad[i]]] / MAG_SIGMA;
+    }
+    for (int k = 0; k < 256; k++) {
+        const int of[4] = {k & 3, k >> 2 & 3, k >> 4 & 3, k >> 6};
+        if ((1 << of[0] | 1 << of[1] | 1 << of[2] | 1 << of[3]) == 15) {
+            double more = 0.0;
+            for (int i = 0; i < 4; i++) {
+                more += (v[of[i]] - v[i]) * s->sources[quad[i]].mag / MAG_SIGMA;
+            }
+            sum += exp(fmin(more, 100.0));
+        }
+    }
+    return (1.0 - UNUSUAL) * 24.0 / sum + UNUSUAL;
+}
+
 /* Density of a star's place in the ellipse of its detection, over that of even spread: a normal one
  * that is cut off at LAST_SIGMAS. */
 static double density_of(double distance2) {
@@ -397,8 +420,8 @@ static double density_of(double distance2) {
 /* Weighs a match of predicted stars: the likelihood of the detections if the attitude is right,
  * over that if they are spread evenly. A star is detected with its probability; it is then the
  * detection with which it is matched with a probability by brightness, and lies in its ellipse. By
- * chance it lies there as in any place. The quad's own detections do not count, nor do stars that
- * are as probable by chance.
+ * chance it lies there as in any place. Of the quad's own detections only the
+ * brightnesses count; stars that are as probable by chance do not.
  *
  * Returned:  out->predicted, matched  those up to the frame's limit
  *            logarithm of the ratio. By the null model its mean is 1, so that it exceeds R with a
@@ -407,7 +430,7 @@ static double log_ratio(const attempt *a, const int quad[4], int predicted, int 
                         bst_lost_in_space_result *out) {
     bst_lost_in_space *s = a->s;
     const double zero_mag = zero_point(s, quad, sources);
-    double area_px2 = 0.0, sum = 0.0;
+    double area_px2 = 0.0, sum = log(brightness_of_quad(s, quad));
     out->predicted = out->matched = 0;
     for (int i = 0; i < sources; i++) {
         area_px2 += is_of(quad, i) ? 0.0 : s->area_px2[i];
