@@ -4,9 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/identify/null_model.h"
-#include "imgproc/identify/star_fit.h"
-#include "sim/core/arena.h"
+#include "imgproc/identify/lost_in_space_internal.h"
 #include "sim/core/heapsort.h"
 
 enum { MOST_PREDICTED = 512, MOST_CANDIDATES = 64, PASSES = 5, PATH_STEPS = 32 };
@@ -24,15 +22,13 @@ static const double LEAST_MOST_TOLERANCE = 0.02, MOST_TOLERANCE = 0.06, FEW = 10
 /* Least distance of a quad's furthest pair, share of the field's shorter side. */
 static const double LEAST_SIZE = 0.08;
 /* Tolerances of matched stars: first, by the quad alone, and last. */
-static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 0.6, LAST_SIGMAS = 3.0;
+static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 0.6, LAST_SIGMAS = BST_LOST_LAST_SIGMAS;
 /* Logarithm of the likelihood ratio of a first match below which a candidate is dropped at once. */
 static const double LEAST_FIRST = 1.5;
 /* Stars are predicted so much beyond the limit at which all are detected, mag. Probabilities that a
  * catalogue star up to that limit, and one at the end, is among the detections: 0.9 falls linearly
  * to 0.2, to a half near an SNR of 6 where the limit is one of 8. */
-static const double FAINTER_MAG = 0.5, SURELY_FOUND = 0.9, LEAST_FOUND = 0.2;
-/* Least chance that a place holds a detection: frames are not as clean as the null model. */
-static const double LEAST_CHANCE = 1e-5;
+static const double FAINTER_MAG = 0.5, SURELY_FOUND = BST_LOST_SURELY_FOUND, LEAST_FOUND = 0.2;
 static const double BRIGHTEST_V = -2.0;
 /* Least share of the predicted stars that a right attitude matches over the whole field. */
 static const double LEAST_SHARE = 0.35;
@@ -40,49 +36,14 @@ static const double LEAST_SHARE = 0.35;
  * of freedom. Right quads with a star on another's streak have up to 25. A candidate by chance has
  * a chi-square below c with a probability that grows with c^2. The error is added to that of each
  * place: distortion and neighbours. */
-static const double MOST_CHI_SQUARED = 28.5, QUAD_PX = 0.3;
-/* Share of right candidates, of matched places and of brightnesses that may be as by chance. */
-static const double UNUSUAL = 0.2;
-/* Magnitudes of detections differ by so much from those of their stars: colours, neighbours. */
-static const double MAG_SIGMA = 0.4;
-/* Least stars of the quad that give the zero point of magnitudes. */
-enum { LEAST_ZERO_STARS = 3 };
+static const double MOST_CHI_SQUARED = BST_LOST_MOST_CHI_SQUARED, QUAD_PX = 0.3;
 /* Least share of a streak inside the window, for a star to be predicted. */
 static const double LEAST_INSIDE = 0.25;
 /* Error of a quad's own scale. */
 static const double SCALE_MARGIN = 3e-3;
 
-/* A detection that takes part. */
-typedef struct source {
-    double x_px, y_px;
-    double cov_xx, cov_xy, cov_yy; /* of the place, px^2 */
-    bst_vec3 cam;                  /* unit, by the camera's own scale */
-    double mag;                    /* of its flux, without a zero point */
-} source;
-
-struct bst_lost_in_space {
-    const bst_camera *camera;
-    const bst_stars *stars;
-    const bst_star_patterns *patterns;
-    double julian_year, depth_v_mag;
-    double most_tolerance; /* of a code */
-    int max_detections;
-    bst_arena arena;
-    int *order;      /* [max_detections] indices of detections, brightest first */
-    source *sources; /* [max_detections] in that order */
-    int count;
-    double *nearest2; /* [max_detections] distance^2 of the star matched to a source, in units of
-                         its tolerance */
-    double *area_px2; /* [max_detections] of a source's tolerance ellipse */
-    double (*inverse)[3]; /* [max_detections] of the tolerance ellipse's matrix: xx, xy, yy */
-    int matched_of;       /* sources of star_of; 0: not solved */
-    int *star_of;         /* [max_detections] predicted star; -1: none */
-    bst_star *found;      /* [MOST_PREDICTED] */
-    bst_star_fit_pair *expected; /* [MOST_PREDICTED] */
-    double *found_share;         /* [MOST_PREDICTED] probability that each is detected */
-    double *v_mag;               /* [MOST_PREDICTED] */
-    bst_star_fit_pair *matched;  /* [MOST_PREDICTED] */
-};
+typedef bst_lost_in_space_source source;
+typedef bst_lost_in_space_attempt attempt;
 
 static void lay_out(bst_lost_in_space *s) {
     size_t items = (size_t)s->max_detections + 1;
@@ -186,17 +147,6 @@ static bst_star_fit_pair pair_of(const source *s, bst_vec3 gcrf) {
                                .cov_xy = s->cov_xy,
                                .cov_yy = s->cov_yy};
 }
-
-/* A frame that is being solved. */
-typedef struct attempt {
-    bst_ctx *ctx;
-    bst_lost_in_space *s;
-    const bst_lost_in_space_options *options;
-    const bst_lost_in_space_frame *frame;
-    double area_px2, side_px; /* of the window; its shorter side */
-    double most_r2;           /* greatest tangent radius^2 in the window */
-    double reach_px;          /* of a star's path from its place */
-} attempt;
 
 static bool is_inside(const attempt *a, double x_px, double y_px) {
     const bst_window w = a->frame->window;
@@ -348,133 +298,20 @@ static int rivals(const bst_lost_in_space *s, int predicted) {
     return s->count < most ? s->count : most;
 }
 
-/* True for a source of the quad. */
-static bool is_of(const int quad[4], int i) {
-    return i == quad[0] || i == quad[1] || i == quad[2] || i == quad[3];
-}
-
-/* Zero point of the detections' magnitudes by the quad's stars, or by all without a quad; NAN:
- * unknown. */
-static double zero_point(const bst_lost_in_space *s, const int quad[4], int sources) {
-    double sum = 0.0;
-    int count = 0;
-    for (int i = 0; i < sources; i++) {
-        if (s->star_of[i] >= 0 && (quad[0] < 0 || is_of(quad, i))) {
-            sum += s->v_mag[s->star_of[i]] - s->sources[i].mag;
-            count++;
-        }
-    }
-    return count >= LEAST_ZERO_STARS ? sum / count : NAN;
-}
-
-/* Probability that a star that is detected is a certain one of the detections beside the quad's,
- * by its brightness.
- *
- * Given:     zero_mag  NAN: all are equally probable */
-static double share_of_detection(const bst_lost_in_space *s, const int quad[4], int sources,
-                                 double zero_mag, int i) {
-    double sum = 0.0, own = 0.0;
-    int others = 0;
-    for (int j = 0; j < sources; j++) {
-        if (!is_of(quad, j)) {
-            double d = (s->v_mag[s->star_of[i]] - s->sources[j].mag - zero_mag) / MAG_SIGMA;
-            double fits = isnan(zero_mag) ? 1.0 : exp(-0.5 * d * d);
-            sum += fits;
-            own = j == i ? fits : own;
-            others++;
-        }
-    }
-    return (sum > 0.0 ? (1.0 - UNUSUAL) * own / sum : 0.0) + UNUSUAL / others;
-}
-
-/* Likelihood of the brightnesses of the quad's stars over its mean over all their permutations,
- * which are equally probable by chance; the zero point is the same for all. */
-static double brightness_of_quad(const bst_lost_in_space *s, const int quad[4]) {
-    double v[4], sum = 0.0;
-    for (int i = 0; i < 4; i++) {
-        if (quad[i] < 0 || s->star_of[quad[i]] < 0) {
-            return 1.0;
-        }
-        v[i] = s->v_mag[s->star_of[quad[i]]] / MAG_SIGMA;
-    }
-    for (int k = 0; k < 256; k++) {
-        const int of[4] = {k & 3, k >> 2 & 3, k >> 4 & 3, k >> 6};
-        if ((1 << of[0] | 1 << of[1] | 1 << of[2] | 1 << of[3]) == 15) {
-            double more = 0.0;
-            for (int i = 0; i < 4; i++) {
-                more += (v[of[i]] - v[i]) * s->sources[quad[i]].mag / MAG_SIGMA;
-            }
-            sum += exp(fmin(more, 100.0));
-        }
-    }
-    return (1.0 - UNUSUAL) * 24.0 / sum + UNUSUAL;
-}
-
-/* Density of a star's place in the ellipse of its detection, over that of even spread: a normal one
- * that is cut off at LAST_SIGMAS. */
-static double density_of(double distance2) {
-    const double k = 0.5 * LAST_SIGMAS * LAST_SIGMAS;
-    return (1.0 - UNUSUAL) * k * exp(-k * distance2) / (1.0 - exp(-k)) + UNUSUAL;
-}
-
-/* Weighs a match of predicted stars: the likelihood of the detections if the attitude is right,
- * over that if they are spread evenly. A star is detected with its probability; it is then the
- * detection with which it is matched with a probability by brightness, and lies in its ellipse. By
- * chance it lies there as in any place. Of the quad's own detections only the
- * brightnesses count; stars that are as probable by chance do not.
- *
- * Returned:  out->predicted, matched  those up to the frame's limit
- *            logarithm of the ratio. By the null model its mean is 1, so that it exceeds R with a
- *            probability of at most 1 / R (Markov's inequality) */
-static double log_ratio(const attempt *a, const int quad[4], int predicted, int sources,
-                        bst_lost_in_space_result *out) {
-    bst_lost_in_space *s = a->s;
-    const double zero_mag = zero_point(s, quad, sources);
-    double area_px2 = 0.0, sum = log(brightness_of_quad(s, quad));
-    out->predicted = out->matched = 0;
-    for (int i = 0; i < sources; i++) {
-        area_px2 += is_of(quad, i) ? 0.0 : s->area_px2[i];
-    }
-    const double chance = fmax(bst_null_model_chance(area_px2, a->area_px2), LEAST_CHANCE);
-    for (int k = 0; k < predicted; k++) {
-        out->predicted += s->found_share[k] >= SURELY_FOUND;
-        sum += s->found_share[k] > chance ? log((1.0 - s->found_share[k]) / (1.0 - chance)) : 0.0;
-    }
-    for (int i = 0; i < sources; i++) {
-        if (s->star_of[i] < 0) {
-            continue;
-        }
-        const double share = s->found_share[s->star_of[i]];
-        out->matched += share >= SURELY_FOUND;
-        if (share > chance) {
-            sum -= log((1.0 - share) / (1.0 - chance));
-            if (!is_of(quad, i)) {
-                double own = fmax(s->area_px2[i] / a->area_px2, LEAST_CHANCE);
-                sum += log(share * density_of(s->nearest2[i]) / own *
-                           share_of_detection(s, quad, sources, zero_mag, i));
-            }
-        }
-    }
-    return sum;
-}
-
 /* Weighs the stars of an attitude and refines it.
  *
  * Given:     quad       sources that gave it
  *            tolerance  of the first match, px */
 static bst_status verify(const attempt *a, bst_star_fit fit, const int quad[4], double tolerance,
                          bst_lost_in_space_result *out) {
-    /* a quad fits by chance with a chi-square whose square is evenly spread */
-    const double prior = quad[0] < 0 ? 0.0 : log((1.0 - UNUSUAL) * 0.125 * MOST_CHI_SQUARED *
-                                                 MOST_CHI_SQUARED * exp(-0.5 * fit.chi_squared) +
-                                             UNUSUAL);
+    const double log_quad = quad[0] < 0 ? 0.0 : bst_lost_in_space_log_quad(fit.chi_squared);
     double evidence = 0.0;
     int predicted, sources, matched;
     for (int pass = 0; pass < PASSES; pass++) {
         BST_TRY(predict(a, &fit, &predicted));
         sources = rivals(a->s, predicted);
         matched = match(a, predicted, sources, tolerance);
-        evidence = prior + log_ratio(a, quad, predicted, sources, out);
+        evidence = log_quad + bst_lost_in_space_log_ratio(a, quad, predicted, sources, out);
         if (pass == 0 || pass == PASSES - 1) {
             out->least_log_chance = fmin(out->least_log_chance, log(out->candidates) - evidence);
         }
