@@ -22,7 +22,8 @@ static const double LEAST_MOST_TOLERANCE = 0.02, MOST_TOLERANCE = 0.06, FEW = 10
 /* Least distance of a quad's furthest pair, share of the field's shorter side. */
 static const double LEAST_SIZE = 0.08;
 /* Tolerances of matched stars: first, by the quad alone, and last. */
-static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 0.6, LAST_SIGMAS = BST_LOST_LAST_SIGMAS;
+static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 0.6,
+                    LAST_SIGMAS = BST_LOST_LAST_SIGMAS;
 /* Logarithm of the likelihood ratio of a first match below which a candidate is dropped at once. */
 static const double LEAST_FIRST = 1.5;
 /* Stars are predicted so much beyond the limit at which all are detected, mag. Probabilities that a

@@ -29,7 +29,7 @@ struct bst_lost_in_space {
     double most_tolerance; /* of a code */
     int max_detections;
     bst_arena arena;
-    int *order;      /* [max_detections] indices of detections, brightest first */
+    int *order;                        /* [max_detections] indices of detections, brightest first */
     bst_lost_in_space_source *sources; /* [max_detections] in that order */
     int count;
     double *nearest2; /* [max_detections] distance^2 of the star matched to a source, in units of

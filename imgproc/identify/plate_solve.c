@@ -96,19 +96,35 @@ static bst_status solve_path(attempt *a, const bst_star_path *path, int candidat
     return solve_middles(a, candidates, NULL, out);
 }
 
+/* Chooses the stars that the catalogue has. */
+static void choose_matched(const attempt *a, bool chosen[BST_PLATE_SOLVE_STARS]) {
+    for (int i = 0; i < a->streak.count; i++) {
+        chosen[i] = bst_lost_in_space_matched(a->lost, i);
+    }
+}
+
 /* True if the ends of a solved frame's streaks are where its stars' light ends. All stars that
  * measured the path give the margin of its ends. Pieces of streaks may be among them, which would
  * keep a path that is too short, and light of others where a streak ends: those of the catalogue
  * have votes. */
 static bool is_certain(const attempt *a) {
     bool chosen[BST_PLATE_SOLVE_STARS];
-    for (int i = 0; i < a->streak.count; i++) {
-        chosen[i] = bst_lost_in_space_matched(a->lost, i);
-    }
+    choose_matched(a, chosen);
     const double votes = bst_streak_finder_votes(a->finder, chosen, &a->streak);
     const double margin = a->streak.ends_margin;
     return votes < CERTAIN_VOTES || (votes < CLEAR_VOTES && margin > LESS_MARGIN) ||
            (votes < 0.0 && margin > LEAST_MARGIN);
+}
+
+/* Moves the ends of a solved frame's streaks to where its identified stars vote for, and solves
+ * again. */
+static bst_status move_ends(attempt *a, bst_lost_in_space_result *out) {
+    bool chosen[BST_PLATE_SOLVE_STARS];
+    const bst_lost_in_space_result near = *out;
+    choose_matched(a, chosen);
+    BST_TRY(bst_streak_finder_move_ends(a->ctx, a->finder, chosen, &a->streak));
+    return (a->joint ? solve_together : solve_middles)(a, BST_LOST_IN_SPACE_USUAL.max_candidates,
+                                                       &near, out);
 }
 
 /* Measures the path on the identified stars and solves again.
@@ -128,8 +144,7 @@ static bst_status improve_once(attempt *a, bool bright, bst_lost_in_space_result
     BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
     BST_TRY((a->joint ? solve_together : solve_middles)(a, BST_LOST_IN_SPACE_USUAL.max_candidates,
                                                         &near, out));
-    *certain =
-        out->solved && fabs(length_px(&a->streak) - before) < SAME_PX && is_certain(a);
+    *certain = out->solved && fabs(length_px(&a->streak) - before) < SAME_PX && is_certain(a);
     return BST_OK;
 }
 
@@ -139,7 +154,12 @@ static bst_status improve_once(attempt *a, bool bright, bst_lost_in_space_result
 static bst_status improve_by(attempt *a, bool bright, bst_lost_in_space_result *out) {
     bool certain = false;
     for (int pass = 0; pass < PASSES && out->solved && !certain; pass++) {
-        BST_TRY(improve_once(a, bright || pass == PASSES - 1, out, &certain));
+        if (pass > 0) {
+            BST_TRY(move_ends(a, out));
+        }
+        if (out->solved) {
+            BST_TRY(improve_once(a, bright || pass == PASSES - 1, out, &certain));
+        }
     }
     out->solved = certain;
     return BST_OK;

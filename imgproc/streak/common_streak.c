@@ -17,7 +17,6 @@ enum { MOST_REACH = 12, REFINING_STARS = 15 };
 enum { COLUMNS = 16 };
 /* Side of the cells of an uneven background, px. */
 enum { CELL = 32 };
-enum { OVERLAP = 12 }; /* samples on either side: MOST_PSF_SIGMA_PX six times over */
 
 /* A background is uneven if the levels of its cells differ by more than this; others stay as they
  * are. Not calibrated: a frame with a glow of 200 sigma is solved without this, one of 1000 is not
@@ -377,39 +376,15 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
     return BST_OK;
 }
 
-/* Value of a sample inside a streak of unit amplitude: the convolved samples overlap. */
-static double overlap(const finder *f) {
-    double sum = 0.0, step = BST_STAR_PATH_STEP_PX / f->psf_sigma_px;
-    for (int k = -OVERLAP; k <= OVERLAP; k++) {
-        sum += exp(-0.25 * k * k * step * step);
-    }
-    return sum;
-}
-
-/* Lists chosen stars; NULL: all. Returns their number. */
-static int choose_stars(const finder *f, const bst_common_streak *found, const bool *chosen,
-                        bst_star_path_star *stars, int most) {
-    const double light = overlap(f);
-    int count = 0;
-    for (int i = 0; i < found->count && count < most; i++) {
-        if (!chosen || chosen[i]) {
-            stars[count++] = (bst_star_path_star){found->items[i].x_px, found->items[i].y_px,
-                                                  found->items[i].flux_e / f->sigma * light};
-        }
-    }
-    return count;
-}
-
 /* Improves the path by stars. */
 static void refine_path(finder *f, const bst_common_streak *found, const bool *chosen) {
     const bst_star_path_image image = image_of(f);
     bst_star_path_star stars[REFINING_STARS];
-    int count = choose_stars(f, found, chosen, stars, REFINING_STARS);
+    int count = bst_streak_finder_choose(f, found, chosen, stars, REFINING_STARS);
     bst_star_path_refine(&f->path, &image, stars, count);
 }
 
-/* Finds all stars by the path. */
-static bst_status find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
+bst_status bst_streak_finder_find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
     out->sigma = f->sigma;
     out->ends_margin = fmin(f->path.margin[0], f->path.margin[1]);
     for (int e = 0; e < 2; e++) {
@@ -491,7 +466,7 @@ bst_status bst_streak_finder_search(bst_ctx *ctx, bst_streak_finder *f, const bs
     assert(f && path && out);
     *out = (bst_common_streak){.items = f->items};
     f->path = *path;
-    return find_all(ctx, f, out);
+    return bst_streak_finder_find_all(ctx, f, out);
 }
 
 bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
@@ -500,7 +475,7 @@ bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
     *out = (bst_common_streak){.items = f->items};
     if (index == BST_STREAK_FINDER_POINT) {
         bst_star_path_point(&f->path);
-        return find_all(ctx, f, out);
+        return bst_streak_finder_find_all(ctx, f, out);
     }
     double quality;
     bst_star_path path;
@@ -516,18 +491,7 @@ bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *f, const bo
                                     bst_common_streak *out) {
     assert(f && chosen && out);
     refine_path(f, out, chosen);
-    return find_all(ctx, f, out);
-}
-
-double bst_streak_finder_votes(bst_streak_finder *f, const bool *chosen,
-                               const bst_common_streak *found) {
-    assert(f && chosen && found);
-    const bst_star_path_image image = image_of(f);
-    bst_star_path_star stars[BST_STAR_PATH_VOTERS];
-    double votes[2];
-    int count = choose_stars(f, found, chosen, stars, BST_STAR_PATH_VOTERS);
-    bst_star_path_vote(&f->path, &image, stars, count, votes);
-    return fmax(votes[0], votes[1]);
+    return bst_streak_finder_find_all(ctx, f, out);
 }
 
 const bst_star_path *bst_streak_finder_path(const bst_streak_finder *f) {

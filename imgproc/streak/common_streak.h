@@ -100,6 +100,14 @@ bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *finder, con
 double bst_streak_finder_votes(bst_streak_finder *finder, const bool *chosen,
                                const bst_common_streak *found);
 
+/* Moves the ends of the path to where chosen stars of the latest search vote for, and finds all
+ * stars again: see bst_star_path_move_ends. They stay as they are if the ends do.
+ *
+ * Given:     chosen  [out->count] stars that are surely right
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_streak_finder_move_ends(bst_ctx *ctx, bst_streak_finder *finder, const bool *chosen,
+                                       bst_common_streak *out) BST_MUST_CHECK;
+
 /* Path of the latest search; it belongs to the finder. */
 const bst_star_path *bst_streak_finder_path(const bst_streak_finder *finder);
 

@@ -72,4 +72,14 @@ bool bst_streak_finder_is_covered(const bst_streak_finder *finder,
  * star left beyond its ends. Places on the paths of much brighter stars are not looked at. */
 bool bst_streak_finder_is_uneven(const bst_streak_finder *finder, const bst_path_filter_peak *peak);
 
+/* Finds all stars by the finder's path. */
+bst_status bst_streak_finder_find_all(bst_ctx *ctx, bst_streak_finder *finder,
+                                      bst_common_streak *out) BST_MUST_CHECK;
+/* Lists the first stars, or those that are chosen, with the amplitudes of their samples.
+ *
+ * Given:     chosen  NULL: all
+ * Returned:  their number, at most `most` */
+int bst_streak_finder_choose(const bst_streak_finder *finder, const bst_common_streak *found,
+                             const bool *chosen, bst_star_path_star *stars, int most);
+
 #endif

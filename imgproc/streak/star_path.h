@@ -96,4 +96,11 @@ enum { BST_STAR_PATH_VOTERS = 64 };
 void bst_star_path_vote(const bst_star_path *path, const bst_star_path_image *image,
                         const bst_star_path_star *stars, int count, double votes[2]);
 
+/* Moves the ends of a path to where the stars vote for: see bst_star_path_vote. The path's origin
+ * is then its middle, and its ends have no margin.
+ *
+ * Returned:  false: they vote for its ends, or it would become too short or too long */
+bool bst_star_path_move_ends(bst_star_path *path, const bst_star_path_image *image,
+                             const bst_star_path_star *stars, int count);
+
 #endif

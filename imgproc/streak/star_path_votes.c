@@ -1,6 +1,7 @@
 /* Votes of identified stars on the ends of their path. */
 #include <assert.h>
 #include <math.h>
+#include <string.h>
 
 #include "imgproc/streak/star_path_internal.h"
 
@@ -19,6 +20,8 @@ static const double MOVED_SHARE = 0.5;
  * for each px beyond the end. */
 enum { FAN = 2 };
 static const double FAN_SLOPE = 0.06;
+/* Least samples of a path with ends. */
+enum { LEAST_SAMPLES = 5 };
 /* Probability that a star has another one's light along its continuation. */
 static const double CROSSED = 0.2;
 
@@ -117,22 +120,88 @@ static double most_votes(const bst_star_path *p, const bst_star_path_image *imag
     return best;
 }
 
+/* What stars vote for at one end. */
+typedef struct ballot {
+    double votes;
+    int at, fan; /* samples by which that end is further out, and the continuation */
+} ballot;
+
+static ballot vote_on(const bst_star_path *p, const bst_star_path_image *image,
+                      const bst_star_path_star *stars, int count, double c[2][3], int end) {
+    ballot best = {.fan = 0};
+    best.votes = most_votes(p, image, stars, count, c, end, -1, 0, &best.at);
+    for (int fan = -FAN; fan <= FAN; fan++) {
+        ballot b = {.fan = fan};
+        b.votes = most_votes(p, image, stars, count, c, end, 1, fan, &b.at);
+        best = b.votes > best.votes ? b : best;
+    }
+    return best;
+}
+
 void bst_star_path_vote(const bst_star_path *path, const bst_star_path_image *image,
                         const bst_star_path_star *stars, int count, double votes[2]) {
     assert(path && image && stars && count >= 0 && votes);
     double c[2][3];
     votes[0] = votes[1] = -HUGE_VAL;
-    if (path->count < 3) {
+    if (path->count < LEAST_SAMPLES) {
         return;
     }
     count = count < BST_STAR_PATH_VOTERS ? count : BST_STAR_PATH_VOTERS;
     fit_parabola(path, c);
     for (int end = 0; end < 2; end++) {
-        int at;
-        votes[end] = most_votes(path, image, stars, count, c, end, -1, 0, &at);
-        for (int fan = -FAN; fan <= FAN; fan++) {
-            votes[end] =
-                fmax(votes[end], most_votes(path, image, stars, count, c, end, 1, fan, &at));
-        }
+        votes[end] = vote_on(path, image, stars, count, c, end).votes;
     }
+}
+
+/* Moves the origin of a path to its middle, and its ends to its first and last sample. */
+static void recentre(bst_star_path *p) {
+    double sum = 0.0;
+    for (int i = 0; i < 2; i++) {
+        double middle = 0.5 * (p->place[(p->count - 1) / 2][i] + p->place[p->count / 2][i]);
+        for (int k = 0; k < p->count; k++) {
+            p->place[k][i] -= middle;
+        }
+        p->ends[0][i] = p->place[0][i];
+        p->ends[1][i] = p->place[p->count - 1][i];
+    }
+    for (int k = 0; k < p->count; k++) {
+        sum += p->light[k];
+    }
+    for (int k = 0; k < p->count; k++) {
+        p->light[k] *= p->count / sum;
+    }
+    p->margin[0] = p->margin[1] = 0.0;
+}
+
+bool bst_star_path_move_ends(bst_star_path *path, const bst_star_path_image *image,
+                             const bst_star_path_star *stars, int count) {
+    assert(path && image && stars && count >= 0);
+    if (path->count < LEAST_SAMPLES) {
+        return false;
+    }
+    double c[2][3];
+    count = count < BST_STAR_PATH_VOTERS ? count : BST_STAR_PATH_VOTERS;
+    fit_parabola(path, c);
+    const ballot b[2] = {vote_on(path, image, stars, count, c, 0),
+                         vote_on(path, image, stars, count, c, 1)};
+    const int first = b[0].votes > 0.0 ? -b[0].at : 0;
+    const int last = path->count - 1 + (b[1].votes > 0.0 ? b[1].at : 0), samples = last - first + 1;
+    if (samples > BST_STAR_PATH_ROOM || samples < LEAST_SAMPLES ||
+        (first == 0 && last == path->count - 1)) {
+        return false;
+    }
+    const bst_star_path old = *path;
+    path->count = samples;
+    for (int k = first; k <= last; k++) {
+        const int end = k < 0 ? 0 : 1, beyond = k < 0 ? -k : k - old.count + 1;
+        double *to = path->place[k - first];
+        if (beyond > 0) {
+            continued_place(&old, c, end, beyond, b[end].fan, to);
+        } else {
+            memcpy(to, old.place[k], sizeof old.place[k]);
+        }
+        path->light[k - first] = beyond > 0 ? 1.0 : old.light[k];
+    }
+    recentre(path);
+    return true;
 }

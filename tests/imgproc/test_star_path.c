@@ -204,8 +204,8 @@ static bst_star_path part_of_curve(double from, double to, bst_star_path_star *s
     draw_part(at[0][0], at[0][1], from, to, 30.0);
     assert_true(bst_star_path_fit(&p, &picture, pixels, above(5.0, pixels), &x, &y));
     for (int i = 0; i < count; i++) {
-        stars[i] = (bst_star_path_star){x + at[i][0] - at[0][0], y + at[i][1] - at[0][1],
-                                        amplitudes[i]};
+        stars[i] =
+            (bst_star_path_star){x + at[i][0] - at[0][0], y + at[i][1] - at[0][1], amplitudes[i]};
     }
     return p;
 }
@@ -240,9 +240,23 @@ static void votes_on_the_ends(void **state) {
             assert_true(fmax(votes[0], votes[1]) < -(STARS - 3) * log(4.0));
         }
         assert_true(fmin(votes[0], votes[1]) < -(STARS - 2) * log(4.0));
+        /* the ends move to where the light ends; a sample is 2 px */
+        const int before = p.count;
+        assert_true(bst_star_path_move_ends(&p, &picture, stars, STARS) == (i == 1 || i == 2));
+        double dx, dy, ex, ey;
+        curve(0, ends[i][1], &dx, &dy);
+        curve(0, -0.5, &ex, &ey);
+        double length = hypot(p.ends[1][0] - p.ends[0][0], p.ends[1][1] - p.ends[0][1]);
+        bst_assert_close(length, hypot(dx - ex, dy - ey), 3.0);
+        assert_true(i == 1   ? p.count > before + 4
+                    : i == 2 ? p.count < before - 4
+                             : p.count == before);
+        bst_assert_close(hypot(p.ends[0][0] + p.ends[1][0], p.ends[0][1] + p.ends[1][1]), 0.0,
+                         0.3 * length);
     }
     bst_star_path point = {.count = 1};
     double votes[2];
+    assert_false(bst_star_path_move_ends(&point, &picture, stars, STARS));
     bst_star_path_vote(&point, &picture, stars, STARS, votes);
     assert_true(isinf(votes[0]) && votes[0] < 0.0 && isinf(votes[1]) && votes[1] < 0.0);
 }
@@ -481,10 +495,15 @@ static void a_point_beside_a_star(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(map_of_a_turn),  cmocka_unit_test(between_pixels),
-        cmocka_unit_test(path_of_stars),  cmocka_unit_test(light_beyond_an_end), cmocka_unit_test(votes_on_the_ends),
-        cmocka_unit_test(point_source),   cmocka_unit_test(two_stars),
-        cmocka_unit_test(over_the_edges), cmocka_unit_test(a_point_beside_a_star),
+        cmocka_unit_test(map_of_a_turn),
+        cmocka_unit_test(between_pixels),
+        cmocka_unit_test(path_of_stars),
+        cmocka_unit_test(light_beyond_an_end),
+        cmocka_unit_test(votes_on_the_ends),
+        cmocka_unit_test(point_source),
+        cmocka_unit_test(two_stars),
+        cmocka_unit_test(over_the_edges),
+        cmocka_unit_test(a_point_beside_a_star),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
