@@ -17,9 +17,9 @@ enum { HOT_PIXELS = 20, BLUR = 5, LARGEST = 1024 };
 typedef struct arguments {
     const char *catalogue, *kind; /* sky or mirrored */
     double fields, first, side, field, v_limit, length, bend, scale, missing, least, snr;
-    double known;  /* 1: the solver is given the true path */
-    double oracle; /* 1: fields that are not solved are solved again with parts of the truth */
-    const char *list; /* file with the numbers of the fields; NULL: from `first` on */
+    double known;     /* 1: the solver is given the true path */
+    double oracle;    /* 1: what is not solved is solved again with parts of the truth */
+    const char *list; /* file with the numbers of fields; NULL: all from `first` on */
 } arguments;
 
 typedef struct scene {
@@ -29,8 +29,6 @@ typedef struct scene {
     bst_quat q_cam_from_gcrf; /* at the middle of the exposure */
     bst_vec3 turn[3];         /* rotation vector: turn[0] u + turn[1] u (1 - u), u from 0 to 1 */
     float *pixels, *scratch;
-    double known[200][4]; /* of these and fainter: place, SNR, share inside */
-    int known_count;
     int usable; /* stars of SNR 8 and more that the onboard catalogue has */
     int side;
     double scale;
@@ -186,7 +184,7 @@ static void draw_stars(const arguments *a, scene *s, const bst_stars *stars,
                     0.6 * a->length * bst_camera_scale_rad(&s->truth) + 2e-4;
     for (int pass = 0; pass < 2; pass++) {
         const bst_stars *from = pass ? onboard : stars;
-        double faintest = a->v_limit + (pass ? 0.5 : 1.5);
+        double faintest = a->v_limit + (pass ? 0.0 : 1.5);
         bst_assert_ok(&ctx,
                       bst_stars_query(&ctx, from, axis, radius, faintest, YEAR, NULL, 0, &count));
         bst_star *found = calloc((size_t)count + 1, sizeof *found);
@@ -202,12 +200,6 @@ static void draw_stars(const arguments *a, scene *s, const bst_stars *stars,
                    squares = 1.0 / (spread * hypot(spread, length_of(s, q, steps, v)));
             double share = add_star(s, q, steps, v, pass ? 0.0 : snr * NOISE / sqrt(squares));
             s->usable += pass && snr * sqrt(share) >= 8.0;
-            double px, py;
-            if (pass && share > 0.1 && snr * sqrt(share) > 5 && s->known_count < 200 &&
-                bst_camera_project(&s->truth, bst_quat_rotate(s->q_cam_from_gcrf, v), &px, &py)) {
-                double *to = s->known[s->known_count++];
-                to[0] = px; to[1] = py; to[2] = snr * sqrt(share); to[3] = share;
-            }
         }
         free(found);
     }
@@ -220,7 +212,6 @@ static void draw(const arguments *a, const bst_stars *stars, const bst_stars *on
     const bst_rng_key key = bst_rng_make_key(31, 0, "test", "streak fields");
     const size_t pixels = (size_t)s->side * (size_t)s->side;
     s->usable = 0;
-    s->known_count = 0;
     s->scale = 1.0 + a->scale * (2.0 * bst_rng_uniform(key, i, 3) - 1.0);
     double tangent = tan(0.5 * a->field * BST_DEG_RAD) / (0.5 * s->side);
     s->camera = (bst_camera){
@@ -248,31 +239,7 @@ static double off_px(const scene *s, const bst_plate_solve_result *r) {
     return hypot(e.x, e.y) / bst_camera_scale_rad(&s->truth);
 }
 
-/* What became of each catalogue star. */
-static void detail(const scene *s, const bst_common_streak *found) {
-    for (int i = 0; i < s->known_count; i++) {
-        const double *k = s->known[i];
-        double best = HUGE_VAL;
-        int at = -1;
-        for (int j = 0; j < found->count; j++) {
-            const bst_detection *d = &found->items[j];
-            double dx = d->x_px - k[0], dy = d->y_px - k[1];
-            double det = d->cov_xx * d->cov_yy - d->cov_xy * d->cov_xy;
-            double d2 = (d->cov_yy * dx * dx - 2 * d->cov_xy * dx * dy + d->cov_xx * dy * dy) / det;
-            if (hypot(dx, dy) < 40 && d2 < best) {
-                best = d2;
-                at = j;
-            }
-        }
-        const bst_detection *d = at >= 0 ? &found->items[at] : NULL;
-        printf("#     star at %.0f %.0f, inside %.2f, SNR %.1f: nearest %.1f sigma, off %.1f px, SNR %.1f, sigma "
-               "%.1f x %.1f\n",
-               k[0], k[1], k[3], k[2], sqrt(best), d ? hypot(d->x_px - k[0], d->y_px - k[1]) : 0,
-               d ? d->snr : 0, d ? sqrt(d->cov_xx) : 0, d ? sqrt(d->cov_yy) : 0);
-    }
-}
-
-/* Path of the stars, from the truth, about the middle of the exposure. */
+/* Path of the stars by the truth, about the middle of the exposure. */
 static void true_path(const scene *s, double tangent_per_px, bst_star_path *path) {
     enum { NODES = 33 };
     bst_star_path_node nodes[NODES];
@@ -300,9 +267,10 @@ static void true_path(const scene *s, double tangent_per_px, bst_star_path *path
 
 /* Solves a frame by its true path: what is not solved here fails for other reasons.
  *
- * Given:     attitude  the solver is given the true attitude and scale, too, and does not search */
+ * Given:     together  stars are fitted together
+ *            attitude  the true attitude and scale are verified, and nothing is searched */
 static void solve_known(const scene *s, bst_lost_in_space *lost, const bst_plate_solve_options *o,
-                        bool attitude, bst_plate_solve_result *out) {
+                        bool together, bool attitude, bst_plate_solve_result *out) {
     bst_ctx ctx = {0};
     const bst_common_streak_options streak = {.max_sources = BST_PLATE_SOLVE_STARS,
                                               .least_snr = o->least_snr,
@@ -310,42 +278,53 @@ static void solve_known(const scene *s, bst_lost_in_space *lost, const bst_plate
                                               .known_path = true};
     bst_streak_finder *finder;
     bst_common_streak found;
+    *out = (bst_plate_solve_result){.points = false};
+    true_path(s, o->tangent_per_px, &out->path);
+    bst_assert_ok(&ctx,
+                  bst_streak_finder_create(&ctx, s->pixels, s->side, s->side, &streak, &finder));
+    bst_assert_ok(&ctx, together ? bst_streak_finder_follow(&ctx, finder, &out->path, o->least_snr,
+                                                            0.25, &found)
+                                 : bst_streak_finder_search(&ctx, finder, &out->path, &found));
     bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
     options.scale_tolerance = o->scale_tolerance;
     options.max_candidates = attitude ? 1 : options.max_candidates;
     const bst_lost_in_space_result truth = {.q_cam_from_gcrf = s->q_cam_from_gcrf,
                                             .scale = s->scale};
-    *out = (bst_plate_solve_result){.points = false};
-    true_path(s, o->tangent_per_px, &out->path);
-    bst_assert_ok(&ctx,
-                  bst_streak_finder_create(&ctx, s->pixels, s->side, s->side, &streak, &finder));
-    for (int i = 0; i < 2 && !out->attitude.solved; i++) {
-        if (i == 0) {
-            bst_assert_ok(&ctx, bst_streak_finder_follow(&ctx, finder, &out->path, o->least_snr,
-                                                         0.25, &found));
-        } else {
-            bst_streak_finder_free(finder);
-            bst_assert_ok(
-                &ctx, bst_streak_finder_create(&ctx, s->pixels, s->side, s->side, &streak, &finder));
-            bst_assert_ok(&ctx, bst_streak_finder_search(&ctx, finder, &out->path, &found));
-        }
-        const bst_lost_in_space_frame frame = {found.items, found.count, {0, 0, s->side, s->side},
-                                               o->v_limit,  o->light,    &out->path,
-                                               attitude ? &truth : NULL};
-        bst_assert_ok(&ctx, bst_lost_in_space_solve(&ctx, lost, &options, &frame, &out->attitude));
-        printf("#   %s path%s: %d found, %s, off %.1f px, %d of %d, least e^%.1f, %d candidates\n",
-               i ? "search" : "follow", attitude ? ", attitude" : "", found.count,
-               out->attitude.solved ? "solved" : "not solved", off_px(s, out),
-               out->attitude.matched, out->attitude.predicted, out->attitude.least_log_chance,
-               out->attitude.candidates);
-        if (attitude && getenv("DETAIL")) {
-            detail(s, &found);
-        }
-    }
+    const bst_lost_in_space_frame frame = {
+        found.items, found.count, {0, 0, s->side, s->side}, o->v_limit,
+        o->light,    &out->path,  attitude ? &truth : NULL};
+    bst_assert_ok(&ctx, bst_lost_in_space_solve(&ctx, lost, &options, &frame, &out->attitude));
     out->stars = found.count;
     out->ends[0] = found.ends[0];
     out->ends[1] = found.ends[1];
     bst_streak_finder_free(finder);
+}
+
+/* What a solver that knows the path, and one that knows the attitude, make of a frame. */
+static void ask_oracle(const scene *s, bst_lost_in_space *lost, const bst_plate_solve_options *o) {
+    for (int i = 0; i < 4; i++) {
+        bst_plate_solve_result r;
+        const bool together = i % 2 == 0, attitude = i >= 2;
+        solve_known(s, lost, o, together, attitude, &r);
+        printf(
+            "#   true path%s, stars %s: %s, off %.1f px, %d of %d of %d detections, least "
+            "e^%.1f, %d candidates\n",
+            attitude ? " and attitude" : "", together ? "together" : "one by one",
+            r.attitude.solved ? "solved" : "not solved", off_px(s, &r), r.attitude.matched,
+            r.attitude.predicted, r.stars, r.attitude.least_log_chance, r.attitude.candidates);
+    }
+}
+
+/* Number of the next field. False: there is none. */
+static bool next_field(const arguments *a, FILE *list, int *done, uint64_t *number) {
+    int listed;
+    if (list) {
+        bool read = fscanf(list, "%d", &listed) == 1;
+        *number = read ? (uint64_t)listed : 0;
+        return read && (*done)++ < a->fields;
+    }
+    *number = (uint64_t)a->first + (uint64_t)*done;
+    return (*done)++ < a->fields;
 }
 
 int main(int argc, char **argv) {
@@ -367,13 +346,10 @@ int main(int argc, char **argv) {
     assert_true(s.pixels && s.scratch && ms);
     int tried = 0, solved = 0, wrong = 0;
     FILE *list = a.list ? fopen(a.list, "r") : NULL;
-    int number;
-    for (uint64_t number_ = (uint64_t)a.first; number_ < (uint64_t)(a.first + a.fields); number_++) {
-        uint64_t i = number_;
-        if (list) {
-            if (fscanf(list, "%d", &number) != 1) break;
-            i = (uint64_t)number;
-        }
+    assert_true(!a.list || list);
+    int done = 0;
+    uint64_t i;
+    while (next_field(&a, list, &done, &i)) {
         draw(&a, stars, onboard, i, &s);
         if (s.usable < 6) {
             continue;
@@ -386,7 +362,7 @@ int main(int argc, char **argv) {
         bst_plate_solve_result r;
         double begin = cpu_s();
         if (a.known > 0.0) {
-            solve_known(&s, lost, &o, false, &r);
+            solve_known(&s, lost, &o, true, false, &r);
         } else {
             bst_assert_ok(&ctx, bst_plate_solve(&ctx, lost, &o, s.pixels, s.side, s.side, &r));
         }
@@ -407,18 +383,13 @@ int main(int argc, char **argv) {
                 r.attitude.log_chance, r.attitude.least_log_chance, r.attitude.quads,
                 r.attitude.patterns, r.attitude.candidates, r.ends_margin, ms[tried - 1]);
         }
-        if (getenv("DBG")) { bst_star_path t; true_path(&s, o.tangent_per_px, &t);
-          printf("# TRUE %d ends %.1f %.1f  %.1f %.1f\n", t.count, t.ends[0][0], t.ends[0][1], t.ends[1][0], t.ends[1][1]);
-          FILE *im = fopen("/tmp/lost/im.f32", "wb"); fwrite(s.pixels, 4, (size_t)(s.side*s.side), im); fclose(im);
-          for (int k = 0; k < s.known_count; k++) printf("# known %.1f %.1f SNR %.1f inside %.2f\n", s.known[k][0], s.known[k][1], s.known[k][2], s.known[k][3]);
-        }
         if (!right && a.oracle > 0.0) {
-            bst_plate_solve_result x;
-            solve_known(&s, lost, &o, false, &x);
-            solve_known(&s, lost, &o, true, &x);
+            ask_oracle(&s, lost, &o);
         }
-        fflush(stdout);
         bst_lost_in_space_free(lost);
+    }
+    if (list) {
+        fclose(list);
     }
     qsort(ms, (size_t)tried, sizeof *ms, by_value);
     double share = tried > 0 ? (double)solved / tried : 0.0;
