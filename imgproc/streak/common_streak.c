@@ -17,6 +17,8 @@ enum { MOST_REACH = 12, REFINING_STARS = 15 };
 enum { COLUMNS = 16 };
 /* Side of the cells of an uneven background, px. */
 enum { CELL = 32 };
+/* Samples on either side that overlap: those of the widest PSF six times over. */
+enum { OVERLAP = 12 };
 
 /* A background is uneven if the levels of its cells differ by more than this; others stay as they
  * are. Not calibrated: a frame with a glow of 200 sigma is solved without this, one of 1000 is not
@@ -374,6 +376,28 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
         }
     }
     return BST_OK;
+}
+
+/* Value of a sample inside a streak of unit amplitude: the convolved samples overlap. */
+static double overlap(const finder *f) {
+    double sum = 0.0, step = BST_STAR_PATH_STEP_PX / f->psf_sigma_px;
+    for (int k = -OVERLAP; k <= OVERLAP; k++) {
+        sum += exp(-0.25 * k * k * step * step);
+    }
+    return sum;
+}
+
+int bst_streak_finder_choose(const finder *f, const bst_common_streak *found, const bool *chosen,
+                             bst_star_path_star *stars, int most) {
+    const double light = overlap(f);
+    int count = 0;
+    for (int i = 0; i < found->count && count < most; i++) {
+        if (!chosen || chosen[i]) {
+            stars[count++] = (bst_star_path_star){found->items[i].x_px, found->items[i].y_px,
+                                                  found->items[i].flux_e / f->sigma * light};
+        }
+    }
+    return count;
 }
 
 /* Improves the path by stars. */

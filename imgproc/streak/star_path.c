@@ -19,6 +19,15 @@ static const double LEAST_SAMPLE = 2.0;
 static const double LEAST_LIGHT = 1.0;
 /* Samples by which ends may differ and be the same. */
 enum { SAME_END = BST_STAR_PATH_SAME_END };
+/* Share of samples with light of another star, and the range of that light, in units of the image's
+ * noise. */
+static const double CROWDED = 0.2, OTHER_RANGE = 10.0;
+/* Unevenness of a star's light along its streak, 1 sigma. Dark samples have it, too, by the wings
+ * of the PSF: an end then lies where the light has fallen to half. */
+static const double UNEVEN = 0.25;
+/* Neighbouring samples share noise: so many count as one (exp(-1) at a distance of two sigma). */
+static const double CORRELATED = 1.7;
+static const double ROOT_2PI = 2.5066282746310002;
 /* Largest correction of the centre line, px. */
 static const double MOST_SHIFT_PX = 2.0;
 
@@ -348,6 +357,24 @@ static double light_at(const bst_star_path *path, const bst_star_path_image *ima
         }
     }
     return 0.0;
+}
+
+double bst_star_path_evidence(const bst_star_path *path, const bst_star_path_image *image,
+                              const bst_star_path_star *star, const double place[2]) {
+    double m[3], a = star->amplitude;
+    bst_star_path_map(path, star->x_px, star->y_px, m);
+    double x = star->x_px + m[0] * place[0] + m[1] * place[1];
+    double y = star->y_px + m[1] * place[0] + m[2] * place[1];
+    if (x < 0.0 || y < 0.0 || x >= image->width - 1 || y >= image->height - 1) {
+        return 0.0;
+    }
+    double v = bst_star_path_image_at(image, x, y), spread = hypot(1.0, UNEVEN * a);
+    double other = CROWDED / (OTHER_RANGE + 4.0 * a);
+    double lit = exp(-0.5 * (v - a) * (v - a) / (spread * spread)) / spread;
+    double dark = exp(-0.5 * v * v / (spread * spread)) / spread;
+    return log(((1.0 - CROWDED) / ROOT_2PI * lit + other) /
+               ((1.0 - CROWDED) / ROOT_2PI * dark + other)) /
+           CORRELATED;
 }
 
 /* Evidence that a place of the path is lit, in the light of all stars together. */

@@ -5,15 +5,6 @@
 
 #include "imgproc/streak/star_path_internal.h"
 
-/* Share of samples with light of another star, and the range of that light, in units of the image's
- * noise. */
-static const double CROWDED = 0.2, OTHER_RANGE = 10.0;
-/* Unevenness of a star's light along its streak, 1 sigma. Dark samples have it, too, by the wings
- * of the PSF: an end then lies where the light has fallen to half. */
-static const double UNEVEN = 0.25;
-/* Neighbouring samples share noise: so many count as one (exp(-1) at a distance of two sigma). */
-static const double CORRELATED = 1.7;
-static const double ROOT_2PI = 2.5066282746310002;
 /* Most samples by which an end is moved, as a share of the path's. */
 static const double MOVED_SHARE = 0.5;
 /* Continuations of the path: so many on either side of the smoothest, each FAN_SLOPE px further out
@@ -24,24 +15,6 @@ static const double FAN_SLOPE = 0.06;
 enum { LEAST_SAMPLES = 5 };
 /* Probability that a star has another one's light along its continuation. */
 static const double CROSSED = 0.2;
-
-double bst_star_path_evidence(const bst_star_path *path, const bst_star_path_image *image,
-                              const bst_star_path_star *star, const double place[2]) {
-    double m[3], a = star->amplitude;
-    bst_star_path_map(path, star->x_px, star->y_px, m);
-    double x = star->x_px + m[0] * place[0] + m[1] * place[1];
-    double y = star->y_px + m[1] * place[0] + m[2] * place[1];
-    if (x < 0.0 || y < 0.0 || x >= image->width - 1 || y >= image->height - 1) {
-        return 0.0;
-    }
-    double v = bst_star_path_image_at(image, x, y), spread = hypot(1.0, UNEVEN * a);
-    double other = CROWDED / (OTHER_RANGE + 4.0 * a);
-    double lit = exp(-0.5 * (v - a) * (v - a) / (spread * spread)) / spread;
-    double dark = exp(-0.5 * v * v / (spread * spread)) / spread;
-    return log(((1.0 - CROWDED) / ROOT_2PI * lit + other) /
-               ((1.0 - CROWDED) / ROOT_2PI * dark + other)) /
-           CORRELATED;
-}
 
 /* Parabola through the samples of the path, in t from -1 to 1 along it, by least squares. */
 static void fit_parabola(const bst_star_path *p, double c[2][3]) {
@@ -71,8 +44,8 @@ static void fit_parabola(const bst_star_path *p, double c[2][3]) {
  *            end     0 or 1
  *            beyond  samples beyond the last, negative: inside
  *            fan     number of the continuation */
-static void continued_place(const bst_star_path *p, double c[2][3], int end, int beyond, int fan,
-                            double place[2]) {
+static void continued_place(const bst_star_path *p, const double c[2][3], int end, int beyond,
+                            int fan, double place[2]) {
     const double half = 0.5 * (p->count - 1), sign = end ? 1.0 : -1.0;
     const int last = end ? p->count - 1 : 0;
     if (beyond <= 0) {
@@ -97,27 +70,21 @@ static double vote(double evidence) {
     return log(((1.0 - CROSSED) * exp(e) + CROSSED) / ((1.0 - CROSSED) + CROSSED * exp(e)));
 }
 
-/* Greatest sum of votes for an end further out (step 1) or further in (step -1).
- *
- * Returned:  *at  samples by which that end is further out */
-static double most_votes(const bst_star_path *p, const bst_star_path_image *image,
-                         const bst_star_path_star *stars, int count, double c[2][3], int end,
-                         int step, int fan, int *at) {
-    double evidence[BST_STAR_PATH_VOTERS] = {0}, best = -HUGE_VAL;
-    const int most = (int)(MOVED_SHARE * p->count);
-    for (int k = 1; k <= most; k++) {
-        double place[2], sum = 0.0;
-        continued_place(p, c, end, step > 0 ? k : 1 - k, fan, place);
-        for (int i = 0; i < count; i++) {
-            evidence[i] += step * bst_star_path_evidence(p, image, &stars[i], place);
-            sum += vote(evidence[i]);
-        }
-        if (k > BST_STAR_PATH_SAME_END && sum > best) {
-            best = sum;
-            *at = step * k;
-        }
-    }
-    return best;
+/* A path, its parabola and the stars that vote. */
+typedef struct electorate {
+    const bst_star_path *path;
+    const bst_star_path_image *image;
+    const bst_star_path_star *stars;
+    int count;
+    double c[2][3];
+} electorate;
+
+static electorate make_electorate(const bst_star_path *path, const bst_star_path_image *image,
+                                  const bst_star_path_star *stars, int count) {
+    electorate e = {path, image, stars, count, {{0}}};
+    e.count = count < BST_STAR_PATH_VOTERS ? count : BST_STAR_PATH_VOTERS;
+    fit_parabola(path, e.c);
+    return e;
 }
 
 /* What stars vote for at one end. */
@@ -126,13 +93,30 @@ typedef struct ballot {
     int at, fan; /* samples by which that end is further out, and the continuation */
 } ballot;
 
-static ballot vote_on(const bst_star_path *p, const bst_star_path_image *image,
-                      const bst_star_path_star *stars, int count, double c[2][3], int end) {
-    ballot best = {.fan = 0};
-    best.votes = most_votes(p, image, stars, count, c, end, -1, 0, &best.at);
+/* Greatest sum of votes for an end further out (step 1) or further in (step -1). */
+static ballot most_votes(const electorate *e, int end, int step, int fan) {
+    double evidence[BST_STAR_PATH_VOTERS] = {0};
+    ballot best = {-HUGE_VAL, 0, fan};
+    const int most = (int)(MOVED_SHARE * e->path->count);
+    for (int k = 1; k <= most; k++) {
+        double place[2], sum = 0.0;
+        continued_place(e->path, e->c, end, step > 0 ? k : 1 - k, fan, place);
+        for (int i = 0; i < e->count; i++) {
+            evidence[i] += step * bst_star_path_evidence(e->path, e->image, &e->stars[i], place);
+            sum += vote(evidence[i]);
+        }
+        if (k > BST_STAR_PATH_SAME_END && sum > best.votes) {
+            best.votes = sum;
+            best.at = step * k;
+        }
+    }
+    return best;
+}
+
+static ballot vote_on(const electorate *e, int end) {
+    ballot best = most_votes(e, end, -1, 0);
     for (int fan = -FAN; fan <= FAN; fan++) {
-        ballot b = {.fan = fan};
-        b.votes = most_votes(p, image, stars, count, c, end, 1, fan, &b.at);
+        ballot b = most_votes(e, end, 1, fan);
         best = b.votes > best.votes ? b : best;
     }
     return best;
@@ -141,15 +125,13 @@ static ballot vote_on(const bst_star_path *p, const bst_star_path_image *image,
 void bst_star_path_vote(const bst_star_path *path, const bst_star_path_image *image,
                         const bst_star_path_star *stars, int count, double votes[2]) {
     assert(path && image && stars && count >= 0 && votes);
-    double c[2][3];
     votes[0] = votes[1] = -HUGE_VAL;
     if (path->count < LEAST_SAMPLES) {
         return;
     }
-    count = count < BST_STAR_PATH_VOTERS ? count : BST_STAR_PATH_VOTERS;
-    fit_parabola(path, c);
+    const electorate e = make_electorate(path, image, stars, count);
     for (int end = 0; end < 2; end++) {
-        votes[end] = vote_on(path, image, stars, count, c, end).votes;
+        votes[end] = vote_on(&e, end).votes;
     }
 }
 
@@ -179,11 +161,8 @@ bool bst_star_path_move_ends(bst_star_path *path, const bst_star_path_image *ima
     if (path->count < LEAST_SAMPLES) {
         return false;
     }
-    double c[2][3];
-    count = count < BST_STAR_PATH_VOTERS ? count : BST_STAR_PATH_VOTERS;
-    fit_parabola(path, c);
-    const ballot b[2] = {vote_on(path, image, stars, count, c, 0),
-                         vote_on(path, image, stars, count, c, 1)};
+    const electorate e = make_electorate(path, image, stars, count);
+    const ballot b[2] = {vote_on(&e, 0), vote_on(&e, 1)};
     const int first = b[0].votes > 0.0 ? -b[0].at : 0;
     const int last = path->count - 1 + (b[1].votes > 0.0 ? b[1].at : 0), samples = last - first + 1;
     if (samples > BST_STAR_PATH_ROOM || samples < LEAST_SAMPLES ||
@@ -196,7 +175,7 @@ bool bst_star_path_move_ends(bst_star_path *path, const bst_star_path_image *ima
         const int end = k < 0 ? 0 : 1, beyond = k < 0 ? -k : k - old.count + 1;
         double *to = path->place[k - first];
         if (beyond > 0) {
-            continued_place(&old, c, end, beyond, b[end].fan, to);
+            continued_place(&old, e.c, end, beyond, b[end].fan, to);
         } else {
             memcpy(to, old.place[k], sizeof old.place[k]);
         }

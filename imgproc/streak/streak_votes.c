@@ -1,35 +1,10 @@
-/* Chosen stars of a frame, and their votes on the ends of the common streak. */
+/* Votes of chosen stars on the ends of the common streak. */
 #include <assert.h>
 #include <math.h>
 
 #include "imgproc/streak/common_streak_internal.h"
 
-/* Samples on either side that overlap: those of the widest PSF six times over. */
-enum { OVERLAP = 12 };
-
 typedef bst_streak_finder finder;
-
-/* Value of a sample inside a streak of unit amplitude: the convolved samples overlap. */
-static double overlap(const finder *f) {
-    double sum = 0.0, step = BST_STAR_PATH_STEP_PX / f->psf_sigma_px;
-    for (int k = -OVERLAP; k <= OVERLAP; k++) {
-        sum += exp(-0.25 * k * k * step * step);
-    }
-    return sum;
-}
-
-int bst_streak_finder_choose(const finder *f, const bst_common_streak *found, const bool *chosen,
-                             bst_star_path_star *stars, int most) {
-    const double light = overlap(f);
-    int count = 0;
-    for (int i = 0; i < found->count && count < most; i++) {
-        if (!chosen || chosen[i]) {
-            stars[count++] = (bst_star_path_star){found->items[i].x_px, found->items[i].y_px,
-                                                  found->items[i].flux_e / f->sigma * light};
-        }
-    }
-    return count;
-}
 
 double bst_streak_finder_votes(finder *f, const bool *chosen, const bst_common_streak *found) {
     assert(f && chosen && found);
