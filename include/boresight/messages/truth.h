@@ -71,6 +71,7 @@ typedef struct bst_truth_shape {
     /* relative to a point of the same light, 1 for a small body: SNR, output of a filter matched to
      * a point, and light of the brightest pixel */
     double snr_ratio, filter_ratio, peak_ratio;
+    double visible; /* share of the light that the Earth's limb leaves, 0 to 1 */
     bst_quat q_body_from_gcrf;
 } bst_truth_shape;
 

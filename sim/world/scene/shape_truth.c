@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/world/scene/source_body.h"
+#include "sim/world/scene/body_limb.h"
 
 void bst_shape_truth_free(bst_shape_truth *work) {
     for (int i = 0; i < BST_TRUTH_SHAPES; i++) {
@@ -67,6 +67,7 @@ typedef struct placed_body {
     const bst_scene_source *source;
     bst_source_body_state state;
     bst_earthlight earthlight;
+    bst_resolved_hidden hidden; /* by the Earth */
 } placed_body;
 
 /* Projects the body: centre of mass, box and extent. */
@@ -84,6 +85,7 @@ static void project(bst_shape_truth *work, const placed_body *placed,
                              .y0_px = INFINITY,
                              .x1_px = -INFINITY,
                              .y1_px = -INFINITY,
+                             .visible = 1.0,
                              .q_body_from_gcrf = body->q_body_from_gcrf};
     (void)bst_camera_project(camera, bst_quat_rotate(q_cam_from_gcrf, body->apparent), &out->x_px,
                              &out->y_px);
@@ -117,7 +119,8 @@ static bst_status find_light(bst_ctx *ctx, bst_shape_truth *work, const placed_b
     const bst_resolved_view view = {
         .q_image_from_body = bst_quat_mul(q, bst_quat_conj(body->q_body_from_gcrf)),
         .origin_m = bst_vec3_scale(bst_quat_rotate(q, body->apparent), body->range_m),
-        .scale_rad = bst_camera_scale_rad(placed->camera)};
+        .scale_rad = bst_camera_scale_rad(placed->camera),
+        .hidden = placed->hidden.count > 0 ? &placed->hidden : NULL};
     const bst_resolved_light light = {.sun = body->aim.sun,
                                       .sun_radius_rad = body->sun_radius_rad,
                                       .earthlight = body->earth ? &placed->earthlight : NULL,
@@ -129,8 +132,18 @@ static bst_status find_light(bst_ctx *ctx, bst_shape_truth *work, const placed_b
         return BST_OK;
     }
     double across = fmax(fmax(high[0] - low[0], high[1] - low[1]), 1e-6);
-    BST_TRY(bst_resolved_begin(ctx, resolved, low, high, across / cells_across(across)));
-    BST_TRY(bst_resolved_add(ctx, resolved, pose, &view, &light, 1.0, NULL));
+    double cell_px = across / cells_across(across), all, seen;
+    if (view.hidden) {
+        bst_resolved_view whole = view;
+        whole.hidden = NULL;
+        BST_TRY(bst_resolved_begin(ctx, resolved, low, high, cell_px));
+        BST_TRY(bst_resolved_add(ctx, resolved, pose, &whole, &light, 1.0, &all));
+    }
+    BST_TRY(bst_resolved_begin(ctx, resolved, low, high, cell_px));
+    BST_TRY(bst_resolved_add(ctx, resolved, pose, &view, &light, 1.0, &seen));
+    if (view.hidden) {
+        out->visible = all > 0.0 ? seen / all : 0.0;
+    }
     double sigma_px = sqrt(pow(bst_camera_psf_sigma_px(placed->camera), 2.0) + 1.0 / 12.0);
     BST_TRY(bst_shape_light_measure(ctx, &work->light, bst_resolved_image_of(resolved), sigma_px,
                                     &figures));
@@ -166,13 +179,17 @@ bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_c
         BST_TRY(reserve(ctx, work, pose->satellite->vertex_count));
         bst_source_body_at(source, 0.5, &placed.state, &placed.earthlight);
         bst_source_body_set_pose(source, &placed.state, pose);
+        const bst_body_limb_view limb = {placed.q_cam_from_gcrf, bst_camera_scale_rad(camera)};
+        (void)bst_body_limb_hidden(source, 0.5, &limb, &placed.hidden);
         bst_truth_shape *shape = &truth->shapes[truth->shape_count++];
         project(work, &placed, pose, shape);
         shape->item = i;
         shape->x_light_px = shape->x_px;
         shape->y_light_px = shape->y_px;
         BST_TRY(find_light(ctx, work, &placed, pose, work->images[slot], shape));
-        truth->items[i].snr *= shape->snr_ratio;
+        truth->items[i].electrons *= shape->visible;
+        truth->items[i].snr *= shape->visible * shape->snr_ratio;
+        truth->items[i].flags |= shape->visible > 0.0 ? 0 : BST_TRUTH_OCCULTED;
         truth->items[i].x_centroid_px += shape->x_light_px - shape->x_px;
         truth->items[i].y_centroid_px += shape->y_light_px - shape->y_px;
     }
