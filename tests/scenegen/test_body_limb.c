@@ -1,8 +1,10 @@
 /* Frames of bodies that the Earth's limb cuts, against integrals over what bst_astro_earth_occults
  * leaves in sight. */
+#include "scenegen/part_mask.h"
 #include "scenegen/renderer.h"
 #include "sim/astro/bodies.h"
 #include "sim/world/scene/body_limb.h"
+#include "sim/world/scene/shape_truth.h"
 #include "tests/satellite/satellite_support.h"
 #include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
@@ -56,6 +58,7 @@ static void make_scene(scene *s, const char *text, bool round, double per_px_e) 
     s->round = round;
     s->body.satellite = s->model.satellite;
     s->body.times = 1;
+    s->body.first_part = 1;
     s->body.q_body_from_gcrf[0] = (bst_quat){0, 1, 0, 0}; /* the front of the plate */
     s->body.sun_m = (bst_vec3){BST_AU_M, 0, 0};
     s->body.gain[0].emission = per_px_e / (PX_RAD * PX_RAD);
@@ -214,7 +217,83 @@ static void test_kinds(void **state) {
     bst_test_model_close(&s.model);
 }
 
+/* Visible share, box, extent and centre of light of the truth, and the mask of parts, against
+ * points of the plate that are in sight. */
+static void test_truth(void **state) {
+    enum { ACROSS = 1000 };
+    fixture *f = *state;
+    scene s;
+    make_scene(&s, plate, false, 1e4);
+    set_limb(&s, 3.3, 3.3);
+    bst_truth *truth = calloc(1, sizeof *truth + sizeof truth->items[0]);
+    assert_non_null(truth);
+    truth->q_cam_from_gcrf_mid = (bst_quat){0, 0, 0, 1};
+    truth->count = 1;
+    truth->items[0] = (bst_truth_item){.electrons = 1e6, .snr = 100.0};
+    const int source_of[] = {0};
+    bst_shape_truth work = {.capacity = 0};
+    bst_assert_ok(&f->ctx,
+                  bst_shape_truth_fill(&f->ctx, &work, &s.camera, &s.source, source_of, truth));
+    const bst_truth_shape *t = &truth->shapes[0];
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY}, sum[3] = {0.0};
+    double across[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+    for (int n = 0; n < ACROSS * ACROSS; n++) {
+        double at[2] = {s.half[0] * (2.0 * (n % ACROSS + 0.5) / ACROSS - 1.0),
+                        s.half[1] * (2.0 * ((double)(n / ACROSS) + 0.5) / ACROSS - 1.0)};
+        if (hidden(s.body.eye.place[2], at[0], at[1])) {
+            continue;
+        }
+        sum[2] += 1.0;
+        for (int k = 0; k < 2; k++) {
+            double diagonal = (at[0] + (k ? 1.0 : -1.0) * at[1]) / sqrt(2.0);
+            sum[k] += at[k];
+            low[k] = fmin(low[k], at[k]);
+            high[k] = fmax(high[k], at[k]);
+            across[k][0] = fmin(across[k][0], diagonal);
+            across[k][1] = fmax(across[k][1], diagonal);
+        }
+    }
+    const double share = sum[2] / ACROSS / ACROSS, step = 2.0 * s.half[0] / ACROSS;
+    assert_true(share > 0.3 && share < 0.7);
+    bst_assert_close(t->visible, share, 1e-3);
+    bst_assert_close(truth->items[0].electrons, 1e6 * share, 1e3);
+    bst_assert_close(t->x0_px, CENTRE + low[0], step);
+    bst_assert_close(t->y0_px, CENTRE + low[1], step);
+    bst_assert_close(t->x1_px, CENTRE + high[0], step);
+    bst_assert_close(t->y1_px, CENTRE + high[1], step);
+    bst_assert_close(t->x_light_px, CENTRE + sum[0] / sum[2], 0.02);
+    bst_assert_close(t->y_light_px, CENTRE + sum[1] / sum[2], 0.02);
+    for (int k = 0; k < 2; k++) { /* the extent is one that is at least as long as others */
+        assert_true(t->size_px > across[k][1] - across[k][0] - step);
+        assert_true(t->size_px > high[k] - low[k] - step);
+    }
+    assert_true(t->size_px < hypot(high[0] - low[0], high[1] - low[1]) + step);
+    static int32_t mask[SIDE * SIDE];
+    bst_part_mask parts = {0};
+    const scene_motion still = {.duration_s = 1.0, .samples = 2};
+    scene_track track = scene_track_make(&s.camera, &still);
+    bst_render_request q = {
+        .window = {0, 0, SIDE, SIDE}, .track = &track.track, .sources = &s.source, .count = 1};
+    bst_assert_ok(&f->ctx, bst_part_mask_draw(&f->ctx, &parts, &s.camera, &q, mask));
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        double x = i % SIDE - CENTRE, y = (double)(i / SIDE) - CENTRE, near = 0.0;
+        bool in = fabs(x) < s.half[0] && fabs(y) < s.half[1];
+        for (int k = 0; k < 4 && in; k++) { /* pixels at the limb are of either */
+            near += hidden(s.body.eye.place[2], x + (k & 1 ? 0.5 : -0.5), y + (k & 2 ? 0.5 : -0.5));
+        }
+        if (in && (near == 0.0 || near == 4.0)) {
+            assert_true((mask[i] != mask[0]) == (near == 0.0));
+        }
+    }
+    scene_track_free(&track);
+    bst_part_mask_free(&parts);
+    bst_shape_truth_free(&work);
+    bst_test_model_close(&s.model);
+    free(truth);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_kinds), cmocka_unit_test(test_cut)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_kinds), cmocka_unit_test(test_truth),
+                                       cmocka_unit_test(test_cut)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

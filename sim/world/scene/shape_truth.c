@@ -70,9 +70,77 @@ typedef struct placed_body {
     bst_resolved_hidden hidden; /* by the Earth */
 } placed_body;
 
+/* Largest distances of points from an origin by direction. */
+enum { DIRECTIONS = 128 };
+typedef struct extents {
+    double most[DIRECTIONS];
+    bool any;
+} extents;
+
+/* Adds what the Earth leaves of a convex part to box and extents. `corners`: [count] places in the
+ * image without distortion, px from the boresight. */
+static void add_visible(const placed_body *placed, bst_polygon_clip *clip,
+                        const bst_point2 *corners, int count, extents *e, bst_truth_shape *out) {
+    double scale_rad = bst_camera_scale_rad(placed->camera);
+    bst_polygon_clip_start(clip, corners, count);
+    bst_polygon_clip_subtract(clip, placed->hidden.corner, placed->hidden.count, false);
+    for (int i = 0; i < clip->piece_count; i++) {
+        for (int k = 0; k < clip->pieces[i].count; k++) {
+            bst_point2 p = clip->points[clip->pieces[i].first + k];
+            const bst_vec3 v = {p.x * scale_rad, p.y * scale_rad, 1.0};
+            if (!bst_camera_project(placed->camera, v, &p.x, &p.y)) {
+                continue;
+            }
+            out->x0_px = fmin(out->x0_px, p.x);
+            out->y0_px = fmin(out->y0_px, p.y);
+            out->x1_px = fmax(out->x1_px, p.x);
+            out->y1_px = fmax(out->y1_px, p.y);
+            for (int d = 0; d < DIRECTIONS; d++) {
+                double a = 2.0 * BST_PI * d / DIRECTIONS;
+                double at = (p.x - out->x_px) * cos(a) + (p.y - out->y_px) * sin(a);
+                e->most[d] = e->any ? fmax(e->most[d], at) : at;
+            }
+            e->any = true;
+        }
+    }
+}
+
+/* Box and extent of what the Earth leaves in sight of the body, by its convex parts. The extent is
+ * right to 1 - cos(pi / DIRECTIONS). */
+static void project_visible(bst_shape_truth *work, const placed_body *placed,
+                            bst_satellite_pose *pose, bst_truth_shape *out) {
+    const bst_satellite *sat = pose->satellite;
+    const bst_source_body_state *body = &placed->state;
+    bst_vec3 centre = bst_vec3_scale(body->apparent, body->range_m);
+    bst_quat back = bst_quat_conj(body->q_body_from_gcrf);
+    double per = 1.0 / bst_camera_scale_rad(placed->camera);
+    extents e = {.any = false};
+    out->x0_px = out->y0_px = INFINITY;
+    out->x1_px = out->y1_px = -INFINITY;
+    for (int o = 0; o < sat->occluder_count; o++) {
+        const bst_occluder *part = &sat->occluders[o];
+        for (int i = 0; i < part->vertex_count; i++) {
+            bst_vec3 v = bst_quat_rotate(back, pose->vertices[part->first_vertex + i]);
+            v = bst_quat_rotate(placed->q_cam_from_gcrf, bst_vec3_add(centre, v));
+            work->points[i] = (bst_point2){per * v.x / v.z, per * v.y / v.z};
+        }
+        int count = bst_polygon_hull(work->points, part->vertex_count, work->hull);
+        if (count > 0 && count <= BST_POLYGON_CORNERS_MAX) {
+            add_visible(placed, &pose->clip, work->hull, count, &e, out);
+        }
+    }
+    out->size_px = e.any ? 0.0 : NAN;
+    for (int d = 0; d < DIRECTIONS / 2 && e.any; d++) {
+        out->size_px = fmax(out->size_px, e.most[d] + e.most[d + DIRECTIONS / 2]);
+    }
+    if (!e.any) {
+        out->x0_px = out->y0_px = out->x1_px = out->y1_px = NAN;
+    }
+}
+
 /* Projects the body: centre of mass, box and extent. */
-static void project(bst_shape_truth *work, const placed_body *placed,
-                    const bst_satellite_pose *pose, bst_truth_shape *out) {
+static void project(bst_shape_truth *work, const placed_body *placed, bst_satellite_pose *pose,
+                    bst_truth_shape *out) {
     const bst_camera *camera = placed->camera;
     const bst_source_body_state *body = &placed->state;
     bst_quat q_cam_from_gcrf = placed->q_cam_from_gcrf;
@@ -102,6 +170,9 @@ static void project(bst_shape_truth *work, const placed_body *placed,
         out->y1_px = fmax(out->y1_px, p->y);
     }
     out->size_px = largest_extent(work->hull, bst_polygon_hull(work->points, count, work->hull));
+    if (placed->hidden.count > 0) {
+        project_visible(work, placed, pose, out);
+    }
 }
 
 /* Cells across the image of a body: a sixteenth of a pixel, within limits. */
