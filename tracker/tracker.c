@@ -77,6 +77,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .max_dormant_sigma_rad = c->max_dormant_sigma_deg * BST_DEG_RAD,
         .dormant_gate_chi2 = c->dormant_gate_chi2,
         .orbits = c->motion == 1,
+        .range_correlation_s = c->size_range_correlation_s,
         .orbit_noise_m2ps3 = square(c->orbit_noise_mps15),
         .gate_chi2 = c->gate_chi2,
         .detection_probability = c->detection_probability,
@@ -248,7 +249,9 @@ static int collect_objects(bst_tracker *t, const bst_detections *d,
                                 .v_mag_sigma = bright ? item->v_mag_sigma : INFINITY,
                                 .snr = item->snr,
                                 .length_rad = extended ? 0.0 : scale * item->length_px,
-                                .width_px = item->width_px};
+                                .width_px = item->width_px,
+                                .range_m = extended ? item->extent.range_m : 0.0,
+                                .range_sigma_m = extended ? item->extent.range_sigma_m : 0.0};
     }
     return count;
 }
