@@ -88,7 +88,7 @@ static void set_limb(scene *s, double from_px, double to_px) {
 
 /* Integral of the error function. */
 static double integral_of_erf(double t) {
-    return t * erf(t) + exp(-t * t) / sqrt(BST_PI);
+    return fabs(t) > 6.0 ? fabs(t) : t * erf(t) + exp(-t * t) / sqrt(BST_PI);
 }
 
 static bool hidden(bst_vec3 eye, double x, double y) {
@@ -131,7 +131,7 @@ static void add_expected(const scene *s, bst_vec3 eye, double step, double value
                     sigma;
             }
         }
-        for (int j = 0; j < SIDE; j++) {
+        for (int j = (int)(y + CENTRE - 9.0); j < y + CENTRE + 9.0; j++) { /* 10 sigma */
             double down = j - CENTRE - y;
             double part = 0.5 * height * (erf((down + 0.5) / sigma) - erf((down - 0.5) / sigma));
             for (int i = 0; i < SIDE && part > 1e-12; i++) {

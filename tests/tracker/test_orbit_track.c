@@ -338,7 +338,7 @@ static void ranges_of_detections(void **state) {
         assert_int_equal(tracks[0].orbit.valid, used);
         if (used) {
             double found = range_with_sigma(&tracks[0].orbit, eye.position_m, &sigma_m);
-            /* the motion tells of the range, too: it is nearer to the truth */
+            /* the motion determines the range, too: it is nearer to the truth */
             assert_true(fabs(found - range) < 0.1 * range);
             assert_true(sigma_m > 0.1 * range && sigma_m < 0.22 * range);
         }
