@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "sim/world/scene/body_limb.h"
 #include "sim/world/scene/los_track.h"
-#include "sim/world/scene/source_body.h"
 
 /* Cells: largest side, px, and the number across a small body. */
 #define CELL_PX 0.5
@@ -112,7 +112,10 @@ static bst_status draw(bst_ctx *ctx, bst_part_mask *work, const frame *f,
     bst_source_body_at(source, 0.5, &state, NULL);
     BST_TRY(use_model(ctx, work, source->body->satellite));
     bst_source_body_set_pose(source, &state, work->pose);
+    bst_resolved_hidden hidden;
+    const bst_body_limb_view limb = {f->q_cam_from_gcrf, f->scale_rad};
     const bst_resolved_view view = {
+        .hidden = bst_body_limb_hidden(source, 0.5, &limb, &hidden) ? &hidden : NULL,
         .q_image_from_body =
             bst_quat_mul(f->q_cam_from_gcrf, bst_quat_conj(state.q_body_from_gcrf)),
         .origin_m =

@@ -122,6 +122,9 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Motion orbit: standard deviation of the range, as a share of it."),
     BST_REAL(C, range_rate_sigma_mps, "m/s", 0, 1e5, "50",
              "Motion orbit: standard deviation of the range rate (of an assumed range: 3000 m/s)."),
+    BST_REAL(C, size_range_correlation_s, "s", 0, 1e9, "3600",
+             "Motion orbit: time constant of the errors of ranges from the size of extended "
+             "targets; 0: these ranges are not used."),
     BST_REAL(C, orbit_noise_mps15, "m/s^1.5", 0, 1e3, "1e-3",
              "Motion orbit: square root of the power spectral density of the acceleration beside "
              "two-body motion."),

@@ -20,21 +20,9 @@ static double square(double v) {
     return v * v;
 }
 
-/* Converts the configuration to the parameters of the multi-target tracker. */
-static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_params *mtt) {
-    double scale = bst_camera_scale_rad(&t->camera);
-    t->attitude_params = (bst_attitude_params){.floor_px = c->star_systematic_px,
-                                               .reject_chi2 = c->star_reject_chi2,
-                                               .max_cross_rad = c->max_attitude_sigma_px * scale,
-                                               .max_roll_rad = arcsec(c->max_roll_sigma_arcsec)};
-    t->error_params =
-        (bst_attitude_error_params){.rate_sigma_radps = arcsec(c->drift_sigma_arcsec_per_s),
-                                    .noise_rad2ps3 = square(arcsec(c->drift_noise_arcsec_per_s15)),
-                                    .jitter_rad = c->jitter_px * scale,
-                                    .gate_chi2 = c->telemetry_gate_chi2,
-                                    .gate_patience = (int)c->max_telemetry_rejections,
-                                    .telemetry_sigma_rad = arcsec(c->telemetry_sigma_arcsec)};
-    t->target_params = (bst_target_params){
+/* Parameters of the selection of the target. */
+static bst_target_params target_params_of(const bst_tracker_config *c) {
+    return (bst_target_params){
         .direction_chi2 = c->target_direction_chi2,
         .rate_chi2 = c->target_rate_chi2,
         .magnitude_chi2 = c->target_magnitude_chi2,
@@ -49,6 +37,23 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .dormant_gate_chi2 = 23.5, /* 99.99 %, 4 degrees of freedom */
         /* a lost target may have manoeuvred: ten times the usual acceleration */
         .memory_noise_rad2ps3 = square(10.0 * arcsec(c->process_noise_arcsec_per_s15))};
+}
+
+/* Converts the configuration to the parameters of the multi-target tracker. */
+static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_params *mtt) {
+    double scale = bst_camera_scale_rad(&t->camera);
+    t->attitude_params = (bst_attitude_params){.floor_px = c->star_systematic_px,
+                                               .reject_chi2 = c->star_reject_chi2,
+                                               .max_cross_rad = c->max_attitude_sigma_px * scale,
+                                               .max_roll_rad = arcsec(c->max_roll_sigma_arcsec)};
+    t->error_params =
+        (bst_attitude_error_params){.rate_sigma_radps = arcsec(c->drift_sigma_arcsec_per_s),
+                                    .noise_rad2ps3 = square(arcsec(c->drift_noise_arcsec_per_s15)),
+                                    .jitter_rad = c->jitter_px * scale,
+                                    .gate_chi2 = c->telemetry_gate_chi2,
+                                    .gate_patience = (int)c->max_telemetry_rejections,
+                                    .telemetry_sigma_rad = arcsec(c->telemetry_sigma_arcsec)};
+    t->target_params = target_params_of(c);
     t->orbits = c->motion == 1;
     t->assumed_range_m = 1e3 * c->assumed_range_km;
     t->range_sigma = c->range_sigma;
@@ -77,6 +82,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .max_dormant_sigma_rad = c->max_dormant_sigma_deg * BST_DEG_RAD,
         .dormant_gate_chi2 = c->dormant_gate_chi2,
         .orbits = c->motion == 1,
+        .range_correlation_s = c->size_range_correlation_s,
         .orbit_noise_m2ps3 = square(c->orbit_noise_mps15),
         .gate_chi2 = c->gate_chi2,
         .detection_probability = c->detection_probability,
@@ -248,7 +254,9 @@ static int collect_objects(bst_tracker *t, const bst_detections *d,
                                 .v_mag_sigma = bright ? item->v_mag_sigma : INFINITY,
                                 .snr = item->snr,
                                 .length_rad = extended ? 0.0 : scale * item->length_px,
-                                .width_px = item->width_px};
+                                .width_px = item->width_px,
+                                .range_m = extended ? item->extent.range_m : 0.0,
+                                .range_sigma_m = extended ? item->extent.range_sigma_m : 0.0};
     }
     return count;
 }

@@ -34,6 +34,7 @@ typedef struct bst_tracker_config {
     int32_t association; /* bst_mtt_association */
     int32_t motion;      /* 1: orbit */
     double assumed_range_km, range_sigma, range_rate_sigma_mps, orbit_noise_mps15;
+    double size_range_correlation_s;
     double manoeuvre_noise_arcsec_per_s15, quiescent_sojourn_s, manoeuvre_sojourn_s;
     double brightness_systematic_mag, brightness_random_walk_mag;
     int64_t event_window;

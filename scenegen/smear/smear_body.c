@@ -8,6 +8,7 @@
 #include "scenegen/smear/body_precision.h"
 #include "scenegen/smear/image_nodes.h"
 #include "scenegen/smear/smear_internal.h"
+#include "sim/world/scene/body_limb.h"
 #include "sim/world/scene/los_track.h"
 
 /* Share of the tolerance for the nodes of the image. */
@@ -104,6 +105,7 @@ static void pose_at(const bst_smear *s, const bst_scene_source *source, double u
     view->origin_m = bst_vec3_scale(bst_quat_rotate(focal, state.apparent), state.range_m);
     view->scale_rad = bst_camera_scale_rad(&s->camera);
     view->limb_px = view->curved_px = 0.0;
+    view->hidden = NULL;
     if (pose) {
         bst_source_body_set_pose(source, &state, pose);
     }
@@ -118,6 +120,27 @@ static void pose_at(const bst_smear *s, const bst_scene_source *source, double u
 /* Angle of the rotation from one attitude to another. */
 static double turn_between(bst_quat from, bst_quat to) {
     return bst_vec3_norm(bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from))));
+}
+
+/* What the Earth hides of the body at time u; NULL: nothing. */
+static const bst_resolved_hidden *hidden_at(const bst_smear *s, const bst_scene_source *source,
+                                            double u, bst_resolved_hidden *hidden) {
+    bst_quat focal =
+        bst_quat_mul(bst_smear_focal_turn(s), bst_los_track_attitude(&s->track, u * s->duration_s));
+    const bst_body_limb_view view = {focal, bst_camera_scale_rad(&s->camera)};
+    return bst_body_limb_hidden(source, u, &view, hidden) ? hidden : NULL;
+}
+
+/* Motion of the Earth's limb across the body in the exposure, px. */
+static double limb_moved_px(const bst_smear *s, const bst_scene_source *source) {
+    double moved = 0.0, radius = bst_smear_radius_px(s, source), before = 0.0;
+    for (int k = 0; k <= PATH_TIMES && source->body->limb; k++) {
+        double behind = bst_body_limb_behind(source, (double)k / PATH_TIMES);
+        behind = fmin(fmax(behind / bst_camera_scale_rad(&s->camera), -radius), radius);
+        moved += k > 0 ? fabs(behind - before) : 0.0;
+        before = behind;
+    }
+    return moved;
 }
 
 /* Image motion in the exposure: of the body's origin, px, and the rotation of its parts, rad. */
@@ -300,6 +323,8 @@ static bst_status draw(bst_ctx *ctx, const bst_body_image_plan *d, int k, bool l
     pose_at(d->s, d->source, d->times.u[k], pose, &view, &light, &earthlight);
     view.curved_px = d->curved_px;
     view.limb_px = fmin(d->limb_px, d->curved_px);
+    bst_resolved_hidden hidden;
+    view.hidden = hidden_at(d->s, d->source, d->times.u[k], &hidden);
     return light_only ? bst_resolved_add_light(ctx, image, pose, &view, &light, weight)
                       : bst_resolved_add(ctx, image, pose, &view, &light, weight, NULL);
 }
@@ -390,7 +415,7 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
                              .light_e = per_px_e(s, source),
                              .curved_px = BST_RESOLVED_CURVED_PX};
     measure(s, source, &d.moved_px, &d.turn_rad);
-    d.turned_px = d.turn_rad * bst_smear_radius_px(s, source);
+    d.turned_px = d.turn_rad * bst_smear_radius_px(s, source) + limb_moved_px(s, source);
     b->one_pose = d.turned_px <= STILL_PX;
     b->x0 = b->y0 = 0.0;
     if (b->one_pose) {

@@ -288,7 +288,7 @@ bst_status bst_cell_view_find(bst_ctx *ctx, bst_visible_surface *s, const bst_su
         const bst_surface_fragment *f = s->polygons[i].from;
         double area =
             several ? add_visible(s->polygons, count, i, clip, same_m, out) : add_whole(f, out);
-        area = f->more_light ? 0.0 : area;
+        area = f->more_light || f->front ? 0.0 : area;
         out->area += area;
         if (area > most) {
             most = area;

@@ -248,6 +248,7 @@ static double add_facet(const bst_resolved_adding *a, int facet, const light_vie
     bst_resolved_areas *s = &a->r->areas;
     bool whole = !s->eye.doubtful[facet] || bst_facet_layers_cut(&s->eye, facet);
     double even = s->even[facet];
+    whole = bst_resolved_cut_hidden(a, facet, whole);
     if (!whole && bst_polygon_clip_is_empty(&s->eye.clip)) {
         return 0.0;
     }

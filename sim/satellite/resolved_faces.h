@@ -63,6 +63,7 @@ struct bst_resolved {
     bst_curved_places places;
     bst_visible_surface surface;
     bst_polygon_coverage whole, lit;  /* of the current facet */
+    bst_polygon_coverage hidden;      /* of the hidden region of the pose */
     bst_resolved_lit_cell *lit_cells; /* in the box of the current facet */
     size_t lit_capacity;
     bst_point2 *outline, *hull; /* of a body, with room */
@@ -81,6 +82,8 @@ typedef struct bst_resolved_adding {
     double per_m;   /* cells per metre at one metre */
     double scale;   /* of the current curved surface, see bst_curved_facet_scale */
     bool earth;
+    bst_point2 hidden[BST_RESOLVED_HIDDEN_CORNERS]; /* of the view, in cells */
+    int hidden_count;                               /* 0: nothing is hidden */
 } bst_resolved_adding;
 
 /* A facet in the image. */
@@ -156,6 +159,17 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
 /* Likewise a facet of a curved surface (resolved_curved.c). */
 bst_status bst_resolved_add_curved_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
                                          bst_resolved_face *f) BST_MUST_CHECK;
+
+/* Sets the hidden region of a pose, in cells (resolved_hidden.c). */
+void bst_resolved_set_hidden(bst_resolved_adding *a);
+/* Prepares the cells of the surface at the border of the hidden region, after bst_resolved_reach.
+ * BST_ERR_MEMORY. */
+bst_status bst_resolved_reach_hidden(bst_ctx *ctx, const bst_resolved_adding *a) BST_MUST_CHECK;
+/* Hides what of the surface is in the hidden region, after all facets. BST_ERR_MEMORY. */
+bst_status bst_resolved_hide(bst_ctx *ctx, const bst_resolved_adding *a) BST_MUST_CHECK;
+/* Cuts the hidden region from a facet of which others leave r->areas.eye.clip, or all of it
+ * (`whole`). Returned: as bst_facet_layers_cut. */
+bool bst_resolved_cut_hidden(const bst_resolved_adding *a, int facet, bool whole);
 
 /* Adds the light of a pose to the sums (resolved_areas.c). BST_ERR_MEMORY. */
 bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a,

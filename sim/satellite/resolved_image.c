@@ -41,6 +41,7 @@ void bst_resolved_free(bst_resolved *r) {
         bst_resolved_areas_free(&r->areas);
         bst_polygon_coverage_free(&r->whole);
         bst_polygon_coverage_free(&r->lit);
+        bst_polygon_coverage_free(&r->hidden);
         free(r);
     }
 }
@@ -119,6 +120,7 @@ static bst_resolved_adding start(bst_resolved *r, bst_satellite_pose *pose,
                              .image_from_body = bst_quat_to_mat3(view->q_image_from_body),
                              .per_m = 1.0 / (view->scale_rad * r->image.cell_px)};
     a.eye_m = bst_vec3_scale(bst_mat3_transpose_mul_vec(&a.image_from_body, view->origin_m), -1.0);
+    bst_resolved_set_hidden(&a);
     if (light) {
         a.earth = light->earthlight && light->earthlight->count > 0;
         bst_sun_disc_make(light->sun, light->sun_radius_rad, r->satellite->lobe_rad, &r->disc);
@@ -138,6 +140,7 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *p
         }
     }
     BST_TRY(bst_resolved_reach(ctx, &a));
+    BST_TRY(bst_resolved_reach_hidden(ctx, &a));
     bst_resolved_face f;
     for (int i = 0; i < sat->facet_count; i++) {
         f.part = sat->facets[i].part;
@@ -145,6 +148,7 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *p
         BST_TRY(sat->facets[i].curved >= 0 ? bst_resolved_add_curved_facet(ctx, &a, i, &f)
                                            : bst_resolved_add_plane_facet(ctx, &a, i, &f));
     }
+    BST_TRY(bst_resolved_hide(ctx, &a));
     double sum;
     BST_TRY(bst_visible_surface_resolve(ctx, &r->surface, &pose->clip,
                                         BST_RESOLVED_SAME * sat->radius_m, 1.0 / a.per_m, weight,

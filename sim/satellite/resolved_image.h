@@ -3,6 +3,16 @@
 #define BST_SATELLITE_RESOLVED_IMAGE_H
 
 #include "sim/satellite/flux.h"
+#include "sim/satellite/polygon_clip.h"
+
+/* Corners of a hidden region, at most. */
+enum { BST_RESOLVED_HIDDEN_CORNERS = 67 };
+
+/* A convex region of the image in which something nearer hides the body, such as the Earth. */
+typedef struct bst_resolved_hidden {
+    bst_point2 corner[BST_RESOLVED_HIDDEN_CORNERS]; /* px from the boresight, counter-clockwise */
+    int count;
+} bst_resolved_hidden;
 
 /* Where the body is in a camera without distortion. Image axes: x right, y down, z along the
  * boresight. A point at (X, Y, Z) is at x = X / (Z scale_rad) px from the boresight, y likewise. */
@@ -14,6 +24,7 @@ typedef struct bst_resolved_view {
                           curved_px; 0: BST_RESOLVED_LIMB_PX */
     double curved_px;  /* the same between parts of curved surfaces, which is in proportion to the
                           square of their size; 0: BST_RESOLVED_CURVED_PX */
+    const bst_resolved_hidden *hidden; /* NULL: nothing hides the body; borrowed */
 } bst_resolved_view;
 
 /* Light of a material, in any unit: from a solid angle of one steradian whose BRDF times cosine of

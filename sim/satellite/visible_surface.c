@@ -66,6 +66,10 @@ void bst_visible_surface_reach(bst_visible_surface *s, int x, int y, int body) {
     }
 }
 
+void bst_visible_surface_clear(bst_visible_surface *s, int x, int y) {
+    *use(s, x, y) = empty;
+}
+
 /* Half of the range of nearness in a cell. */
 static float half_range(const bst_nearness *n) {
     return 0.5F * (fabsf(n->x_m) + fabsf(n->y_m));

@@ -19,6 +19,7 @@ typedef struct bst_surface_fragment {
     float light;                /* of a whole cell of such a surface */
     int body;                   /* fragments of one body hide nothing of each other */
     int16_t part;
+    bool front;      /* no part of the satellite: hides what is behind */
     bool more_light; /* light on another fragment of the same plane and body: hides nothing */
     int first, count, next; /* set by this module: its corners, counter-clockwise (count 0: those of
                                the cell), and another one of the same cell; -1: none */
@@ -81,6 +82,9 @@ void bst_visible_surface_reach(bst_visible_surface *surface, int x, int y, int b
 bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *surface, int x, int y,
                                    const bst_surface_fragment *fragment, const bst_point2 *corners,
                                    int count) BST_MUST_CHECK;
+
+/* Empties a cell. */
+void bst_visible_surface_clear(bst_visible_surface *surface, int x, int y);
 
 /* What is visible of a cell. */
 typedef struct bst_cell_view {

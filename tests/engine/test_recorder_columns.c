@@ -166,6 +166,7 @@ static void send_full_truth(bst_ctx *ctx, bst_recorder *recorder) {
     PUT(s, x1_px, "x1_px");
     PUT(s, y1_px, "y1_px");
     PUT(s, size_px, "size_px");
+    PUT(s, visible, "visible");
     s->q_body_from_gcrf = keep_quat(table, XYZW("q_body_from_gcrf"));
     send(ctx, recorder, BST_CHANNEL_TRUTH, t, t->end_tick);
     free(t);

@@ -86,7 +86,7 @@ static void print_image(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
     double range_m = RANGE * s->radius_m, scale_rad = 2.0 * s->radius_m / range_m / SPAN;
     bst_quat look = bst_quat_look(bst_vec3_scale(eye, -1.0), bst_vec3_perpendicular(eye));
     bst_vec3 down = bst_quat_rotate(bst_quat_conj(look), (bst_vec3){0, 1, 0});
-    bst_resolved_view view = {look, {0, 0, range_m}, scale_rad, 0.0, 0.0};
+    bst_resolved_view view = {look, {0, 0, range_m}, scale_rad, 0.0, 0.0, NULL};
     bst_resolved_light light = {.sun = sun, .gain = gain};
     double low[2] = {-SIDE / 2, -SIDE / 2}, high[2] = {SIDE / 2, SIDE / 2};
     for (int i = 0; i < s->material_count; i++) {

@@ -74,7 +74,7 @@ static double compare(bst_test_model *m, bst_vec3 eye, bst_vec3 sun, double scal
     bst_resolved_light light = {.sun = sun, .gain = gain};
     bst_vec3 to = bst_vec3_scale(bst_vec3_unit(eye), -1.0);
     bst_quat look = bst_quat_look(to, (bst_vec3){0.3, 0.8, 0.4});
-    bst_resolved_view view = {look, {0, 0, bst_vec3_norm(eye)}, scale_rad, 0.0, 0.0};
+    bst_resolved_view view = {look, {0, 0, bst_vec3_norm(eye)}, scale_rad, 0.0, 0.0, NULL};
     double low[2], high[2], worst = 0.0, brightest = 0.0;
     assert_true(bst_resolved_box(m->pose, &view, low, high));
     for (int k = 0; k < 2; k++) {
@@ -143,7 +143,8 @@ static void test_grazing_shadow(void **state) {
         {0, 0, bst_vec3_norm(eye)},
         0.0002,
         0.0,
-        0.0};
+        0.0,
+        NULL};
     double low[2], high[2], total;
     assert_true(bst_resolved_box(m.pose, &view, low, high));
     bst_assert_ok(&ctx, bst_resolved_create(&ctx, m.satellite, &r));
@@ -198,7 +199,8 @@ static double light_in_cells(const bst_test_model *m, bst_vec3 eye, bst_vec3 sun
                               {0, 0, range_m},
                               2.0 * m->satellite->radius_m / range_m / 40.0,
                               1e-5,
-                              1e-5};
+                              1e-5,
+                              NULL};
     double low[2], high[2], total;
     assert_true(bst_resolved_box(m->pose, &view, low, high));
     bst_assert_ok(&ctx, bst_resolved_create(&ctx, m->satellite, &r));

@@ -6,7 +6,7 @@
 static bst_resolved_view look_from(bst_vec3 direction, bst_vec3 right, double range_m,
                                    double scale_rad) {
     bst_quat q = bst_quat_look(bst_vec3_scale(direction, -1.0), right);
-    return (bst_resolved_view){q, {0, 0, range_m}, scale_rad, 0.0, 0.0};
+    return (bst_resolved_view){q, {0, 0, range_m}, scale_rad, 0.0, 0.0, NULL};
 }
 
 /* Light and cover (px^2) of an image. */

@@ -129,7 +129,8 @@ static double compare_sides(bst_satellite *satellite, double left_out) {
                                   {0, 0, 20.0},
                                   0.0025 + 0.001 * n,
                                   0.0,
-                                  0.0};
+                                  0.0,
+                                  NULL};
         bst_resolved *cuts = draw_within(pose, &view, &light, BY_CUTS, left_out);
         bst_resolved *areas = draw_within(pose, &view, &light, BY_AREAS, left_out);
         worst = fmax(worst, difference(bst_resolved_image_of(cuts), bst_resolved_image_of(areas)));
@@ -205,7 +206,8 @@ static void test_border_across_border(void **state) {
             {0, 0, range_m},
             2.0 / 30.0 / 140.0,
             0.0,
-            0.0};
+            0.0,
+            NULL};
         bst_resolved *cuts = draw(pose, &view, &light, BY_CUTS);
         bst_resolved *areas = draw(pose, &view, &light, BY_AREAS);
         bst_assert_close(difference(bst_resolved_image_of(cuts), bst_resolved_image_of(areas)), 0.0,
@@ -272,7 +274,8 @@ static void test_plane_along_edges(void **state) {
                               {0, 0, 60.0},
                               0.001,
                               0.0,
-                              0.0};
+                              0.0,
+                              NULL};
     bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
     bst_resolved *cuts = draw(pose, &view, &light, BY_CUTS);
     bst_resolved *areas = draw(pose, &view, &light, BY_AREAS);
@@ -473,8 +476,12 @@ static void test_faint_edges(void **state) {
     bst_satellite_pose *pose;
     bst_resolved_gain gain[1] = {{.sun = 1.0}};
     bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.3, 0.2, 1.0}), .gain = gain};
-    bst_resolved_view view = {
-        bst_quat_look((bst_vec3){0, 0, -1.0}, (bst_vec3){1, 0, 0}), {0, 0, 20.0}, 0.001, 0.0, 0.0};
+    bst_resolved_view view = {bst_quat_look((bst_vec3){0, 0, -1.0}, (bst_vec3){1, 0, 0}),
+                              {0, 0, 20.0},
+                              0.001,
+                              0.0,
+                              0.0,
+                              NULL};
     bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
     bst_resolved *all = draw(pose, &view, &light, BY_AREAS);
     bst_resolved *faint = draw(pose, &view, &light, BY_BLURRED_AREAS);

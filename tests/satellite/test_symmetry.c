@@ -207,7 +207,7 @@ static void images(void **state) {
         bst_quat q = bst_quat_look(bst_vec3_scale(s.eye, -1.0), (bst_vec3){0.3, 1.0, 0.2});
         /* the second camera is rolled by right angles about its boresight, not about the body */
         bst_quat roll = bst_quat_from_rotvec((bst_vec3){0, 0, 0.5 * BST_PI * k});
-        bst_resolved_view v = {q, {1.1, -0.7, 60.0}, 0.002, 0.0, 0.0}, w = v;
+        bst_resolved_view v = {q, {1.1, -0.7, 60.0}, 0.002, 0.0, 0.0, NULL}, w = v;
         w.q_image_from_body = bst_quat_mul(roll, bst_quat_mul(q, bst_quat_conj(both.turn)));
         w.origin_m = bst_vec3_sub(bst_quat_rotate(roll, v.origin_m),
                                   bst_quat_rotate(w.q_image_from_body, SHIFT_M));

@@ -31,9 +31,6 @@ bool bst_tracker_frame_is_expected(const void *user, const bst_mtt_track *track)
                                   track->id == t->target.id ? &t->target : NULL);
 }
 
-/* 1 sigma of the range rate of any orbit about the Earth. */
-static const double ANY_RANGE_RATE_MPS = 3000.0;
-
 bool bst_tracker_frame_range_of(const void *user, const bst_mtt_track *track,
                                 bst_orbit_range *out) {
     const bst_tracker_frame_view *f = user;
@@ -61,7 +58,7 @@ bool bst_tracker_frame_range_of(const void *user, const bst_mtt_track *track,
         .range_m = range,
         .range_sigma_m = t->range_sigma * range,
         .range_rate_mps = cued ? f->range_rate_mps : 0.0,
-        .range_rate_sigma_mps = cued ? t->range_rate_sigma_mps : ANY_RANGE_RATE_MPS};
+        .range_rate_sigma_mps = cued ? t->range_rate_sigma_mps : BST_ANY_RANGE_RATE_MPS};
     return true;
 }
 

@@ -56,6 +56,7 @@ typedef struct bst_mtt_params {
     int confirm_hits, confirm_frames; /* M of N, including the two initial detections */
     double confirm_score;             /* least log-likelihood ratio */
     bool orbits; /* tracks whose range is known or assumed move along orbits (orbit_track.h) */
+    double range_correlation_s;   /* of ranges of detections; 0: they are not used */
     double orbit_noise_m2ps3;     /* white acceleration in addition to two-body motion */
     double max_rate_radps;        /* of tracks that start without the cue */
     double cue_rate_margin_radps; /* widens the cue's rate sigma */
@@ -113,8 +114,9 @@ typedef struct bst_mtt_detection {
     double x_px, y_px;
     double v_mag, v_mag_sigma; /* sigma INFINITY: brightness unknown */
     double snr;
-    double length_rad; /* FWHM of its image along its longer axis */
-    double width_px;   /* FWHM across; 0: unknown */
+    double length_rad;             /* FWHM of its image along its longer axis */
+    double width_px;               /* FWHM across; 0: unknown */
+    double range_m, range_sigma_m; /* from its size; 0: unknown */
 } bst_mtt_detection;
 
 /* Hypothetical defective pixel that caused a track's detections. */

@@ -101,6 +101,9 @@ bst_status bst_od_predict(bst_ctx *ctx, const bst_od_motion *motion, const bst_o
                           const double covariance[6][6], const bst_od_observer *observer,
                           bst_od_sight *out, double sky_covariance[4][4]) BST_MUST_CHECK;
 
+/* 1 sigma of the range rate of an object about the Earth of which none is known. */
+#define BST_ANY_RANGE_RATE_MPS 3000.0
+
 /* Prior of a range and range rate, m and m/s, with standard deviations. */
 typedef struct bst_orbit_range {
     double range_m, range_sigma_m, range_rate_mps, range_rate_sigma_mps;

@@ -149,6 +149,47 @@ bool bst_orbit_track_update(bst_orbit_track *t, const bst_sky_state *posterior) 
     return t->valid;
 }
 
+bool bst_orbit_track_range(bst_orbit_track *t, const bst_od_observer *observer,
+                           const bst_orbit_measured_range *z) {
+    static const double MOST_SIGMA = 5.0;
+    assert(t && t->valid && observer && z && z->range_m > 0.0 && z->sigma_m > 0.0);
+    bst_vec3 way = bst_vec3_sub(t->state.position_m, observer->position_m);
+    double range_m = bst_vec3_norm(way), variance = z->sigma_m * z->sigma_m;
+    double gain[6], along = 0.0, x[6];
+    if (t->ranged && z->correlation_s > 0.0) {
+        double since_s = fabs(t->state.time_s - t->range_s);
+        variance *= fmax(2.0 * z->correlation_s / fmax(since_s, 1e-9), 1.0);
+    }
+    const double slope[3] = {way.x / range_m, way.y / range_m, way.z / range_m};
+    for (int i = 0; i < 6; i++) {
+        gain[i] = 0.0;
+        for (int k = 0; k < 3; k++) {
+            gain[i] += t->covariance[i][k] * slope[k];
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        along += slope[k] * gain[k];
+    }
+    double total = along + variance, step = z->range_m - range_m;
+    if (!(step * step <= MOST_SIGMA * MOST_SIGMA * (along + z->sigma_m * z->sigma_m))) {
+        return false;
+    }
+    for (int i = 0; i < 6; i++) {
+        x[i] = gain[i] / total * step;
+        for (int k = 0; k <= i; k++) {
+            t->covariance[i][k] -= gain[i] * gain[k] / total;
+            t->covariance[k][i] = t->covariance[i][k];
+        }
+        t->valid = t->valid && t->covariance[i][i] > 0.0 && isfinite(x[i]);
+    }
+    t->state.position_m = bst_vec3_add(t->state.position_m, (bst_vec3){x[0], x[1], x[2]});
+    t->state.velocity_mps = bst_vec3_add(t->state.velocity_mps, (bst_vec3){x[3], x[4], x[5]});
+    t->ranged = true;
+    t->range_s = t->state.time_s;
+    project_to_sky(t, observer);
+    return t->valid;
+}
+
 bool bst_sky_fuse(bst_sky_state *a, const bst_sky_state *b) {
     double d[4], pb[4][4], sum[4][4], inverse[4][4], gain[4][4], after[4][4], x[4];
     sky_difference(a, b, d, pb);

@@ -61,16 +61,18 @@ enum { BST_TRUTH_SHAPES = 8 };
 /* An object with a shape at mid-exposure. Pixels are full-sensor coordinates; NAN where a part is
  * behind the camera. */
 typedef struct bst_truth_shape {
-    int32_t item;                      /* index in items */
-    double x_px, y_px;                 /* centre of mass: the origin of the body */
-    double x0_px, y0_px, x1_px, y1_px; /* box around all parts, lit or not, without the PSF */
-    double size_px;                    /* largest extent of all parts */
-    double x_light_px, y_light_px;     /* centroid of light; of the centre of mass without light */
+    int32_t item;      /* index in items */
+    double x_px, y_px; /* centre of mass: the origin of the body */
+    /* box around all parts, lit or not, without the PSF, and their largest extent; of what the
+     * Earth's limb leaves, NAN for nothing */
+    double x0_px, y0_px, x1_px, y1_px, size_px;
+    double x_light_px, y_light_px; /* centroid of light; of the centre of mass without light */
     double light_xx_px2, light_xy_px2,
         light_yy_px2; /* second central moments of the light, without the PSF */
     /* relative to a point of the same light, 1 for a small body: SNR, output of a filter matched to
      * a point, and light of the brightest pixel */
     double snr_ratio, filter_ratio, peak_ratio;
+    double visible; /* share of the light that the Earth's limb leaves, 0 to 1 */
     bst_quat q_body_from_gcrf;
 } bst_truth_shape;
 

@@ -29,6 +29,7 @@ bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
             bst_io_real_value(s->x1_px),
             bst_io_real_value(s->y1_px),
             bst_io_real_value(s->size_px),
+            bst_io_real_value(s->visible),
             bst_io_real_value(s->q_body_from_gcrf.x),
             bst_io_real_value(s->q_body_from_gcrf.y),
             bst_io_real_value(s->q_body_from_gcrf.z),

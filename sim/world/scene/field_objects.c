@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "sim/optics/psf.h"
+#include "sim/world/scene/body_limb.h"
 
 /* instants of the exposure at which an object's light is sampled */
 enum { TIMES = 16 };
@@ -253,8 +254,24 @@ static bool sample_light(course *c, bst_scene_source_rate *rate, double *mean) {
     return changes;
 }
 
+/* Finds what the Earth's limb does to a body. */
+static bst_body_limb_kind find_limb(const course *c, const bst_scene_source *source,
+                                    bst_scene_source_body *body) {
+    for (int k = 0; k < BST_PATH_NODES; k++) {
+        body->eye.place[k] = c->light->eye_m[k];
+    }
+    body->lag_m = c->light->lag_m;
+    body->pole = c->light->pole;
+    body->satellite = bst_scene_view_object(c->query->view, c->object)->shape->satellite;
+    body->limb = true;
+    bst_body_limb_kind kind = bst_body_limb_during(source);
+    body->limb = kind == BST_BODY_LIMB_CUTS;
+    return kind;
+}
+
 /* Makes the body of an object with a shape, if it spans more than a fiftieth of a pixel: its centre
- * of light is then at most 0.01 px from its centre of mass. */
+ * of light is then at most 0.01 px from its centre of mass. One that the Earth's limb cuts is not
+ * occulted. */
 static bst_status make_body(bst_ctx *ctx, const course *c, const bst_world_sight *mid,
                             bst_scene_object_parts *parts, bst_scene_source *out) {
     static const double LEAST_PX = 0.02;
@@ -263,7 +280,7 @@ static bst_status make_body(bst_ctx *ctx, const course *c, const bst_world_sight
     double pixels = shape ? 2.0 * shape->satellite->radius_m / mid->range_m /
                                 bst_camera_scale_rad(q->camera) * bst_camera_stretch(q->camera)
                           : 0.0;
-    if (!mid->glow.resolved || !(pixels > LEAST_PX) || mid->occulted) {
+    if (!mid->glow.resolved || !(pixels > LEAST_PX)) {
         return BST_OK;
     }
     if (!parts->body) {
@@ -272,10 +289,16 @@ static bst_status make_body(bst_ctx *ctx, const course *c, const bst_world_sight
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the shape of an object");
         }
     }
-    bst_scene_view_body(q->view, &q->span, c->object, c->path, c->light, q->camera, parts->body);
     out->body = parts->body;
     out->body_u[0] = 0.0;
     out->body_u[1] = 1.0;
+    bool cut = find_limb(c, out, parts->body) == BST_BODY_LIMB_CUTS;
+    out->occulted = mid->occulted && !cut;
+    if (out->occulted) {
+        out->body = NULL;
+        return BST_OK;
+    }
+    bst_scene_view_body(q->view, &q->span, c->object, c->path, c->light, q->camera, parts->body);
     return BST_OK;
 }
 
@@ -313,20 +336,20 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
     }
     out->outside = q->wider && !path_touches(q, out, disc, q->window, &q->near_cone);
     course c = {q, object, &parts->path, &light};
-    if (!mid.occulted && q->span.end_s > q->span.start_s &&
+    if (info->shape) {
+        BST_TRY(make_body(ctx, &c, &mid, parts, out));
+    }
+    if (!out->occulted && q->span.end_s > q->span.start_s &&
         sample_light(&c, &parts->rate, &out->electrons_per_s)) {
         out->rate = &parts->rate;
     } else {
         out->electrons_per_s =
-            mid.occulted ? 0.0 : bst_scene_glow_electrons_per_s(q->camera, &mid.glow, NULL);
+            out->occulted ? 0.0 : bst_scene_glow_electrons_per_s(q->camera, &mid.glow, NULL);
     }
     if (q->camera->psf && bst_psf_spectra(q->camera->psf) > 1) {
         make_colour(&c, &mid, out);
     }
-    if (bst_scene_view_object(q->view, object)->shape) {
-        return make_body(ctx, &c, &mid, parts, out);
-    }
-    if (make_shape(&c, &mid, out, &parts->shape)) {
+    if (!info->shape && make_shape(&c, &mid, out, &parts->shape)) {
         out->shape = &parts->shape;
     }
     return BST_OK;

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/world/scene/source_body.h"
+#include "sim/world/scene/body_limb.h"
 
 void bst_shape_truth_free(bst_shape_truth *work) {
     for (int i = 0; i < BST_TRUTH_SHAPES; i++) {
@@ -67,11 +67,80 @@ typedef struct placed_body {
     const bst_scene_source *source;
     bst_source_body_state state;
     bst_earthlight earthlight;
+    bst_resolved_hidden hidden; /* by the Earth */
 } placed_body;
 
+/* Largest distances of points from an origin by direction. */
+enum { DIRECTIONS = 128 };
+typedef struct extents {
+    double most[DIRECTIONS];
+    bool any;
+} extents;
+
+/* Adds what the Earth leaves of a convex part to box and extents. `corners`: [count] places in the
+ * image without distortion, px from the boresight. */
+static void add_visible(const placed_body *placed, bst_polygon_clip *clip,
+                        const bst_point2 *corners, int count, extents *e, bst_truth_shape *out) {
+    double scale_rad = bst_camera_scale_rad(placed->camera);
+    bst_polygon_clip_start(clip, corners, count);
+    bst_polygon_clip_subtract(clip, placed->hidden.corner, placed->hidden.count, false);
+    for (int i = 0; i < clip->piece_count; i++) {
+        for (int k = 0; k < clip->pieces[i].count; k++) {
+            bst_point2 p = clip->points[clip->pieces[i].first + k];
+            const bst_vec3 v = {p.x * scale_rad, p.y * scale_rad, 1.0};
+            if (!bst_camera_project(placed->camera, v, &p.x, &p.y)) {
+                continue;
+            }
+            out->x0_px = fmin(out->x0_px, p.x);
+            out->y0_px = fmin(out->y0_px, p.y);
+            out->x1_px = fmax(out->x1_px, p.x);
+            out->y1_px = fmax(out->y1_px, p.y);
+            for (int d = 0; d < DIRECTIONS; d++) {
+                double a = 2.0 * BST_PI * d / DIRECTIONS;
+                double at = (p.x - out->x_px) * cos(a) + (p.y - out->y_px) * sin(a);
+                e->most[d] = e->any ? fmax(e->most[d], at) : at;
+            }
+            e->any = true;
+        }
+    }
+}
+
+/* Box and extent of what the Earth leaves in sight of the body, by its convex parts. The extent is
+ * right to 1 - cos(pi / DIRECTIONS). */
+static void project_visible(bst_shape_truth *work, const placed_body *placed,
+                            bst_satellite_pose *pose, bst_truth_shape *out) {
+    const bst_satellite *sat = pose->satellite;
+    const bst_source_body_state *body = &placed->state;
+    bst_vec3 centre = bst_vec3_scale(body->apparent, body->range_m);
+    bst_quat back = bst_quat_conj(body->q_body_from_gcrf);
+    double per = 1.0 / bst_camera_scale_rad(placed->camera);
+    extents e = {.any = false};
+    out->x0_px = out->y0_px = INFINITY;
+    out->x1_px = out->y1_px = -INFINITY;
+    for (int o = 0; o < sat->occluder_count; o++) {
+        const bst_occluder *part = &sat->occluders[o];
+        for (int i = 0; i < part->vertex_count; i++) {
+            bst_vec3 v = bst_quat_rotate(back, pose->vertices[part->first_vertex + i]);
+            v = bst_quat_rotate(placed->q_cam_from_gcrf, bst_vec3_add(centre, v));
+            work->points[i] = (bst_point2){per * v.x / v.z, per * v.y / v.z};
+        }
+        int count = bst_polygon_hull(work->points, part->vertex_count, work->hull);
+        if (count > 0 && count <= BST_POLYGON_CORNERS_MAX) {
+            add_visible(placed, &pose->clip, work->hull, count, &e, out);
+        }
+    }
+    out->size_px = e.any ? 0.0 : NAN;
+    for (int d = 0; d < DIRECTIONS / 2 && e.any; d++) {
+        out->size_px = fmax(out->size_px, e.most[d] + e.most[d + DIRECTIONS / 2]);
+    }
+    if (!e.any) {
+        out->x0_px = out->y0_px = out->x1_px = out->y1_px = NAN;
+    }
+}
+
 /* Projects the body: centre of mass, box and extent. */
-static void project(bst_shape_truth *work, const placed_body *placed,
-                    const bst_satellite_pose *pose, bst_truth_shape *out) {
+static void project(bst_shape_truth *work, const placed_body *placed, bst_satellite_pose *pose,
+                    bst_truth_shape *out) {
     const bst_camera *camera = placed->camera;
     const bst_source_body_state *body = &placed->state;
     bst_quat q_cam_from_gcrf = placed->q_cam_from_gcrf;
@@ -84,6 +153,7 @@ static void project(bst_shape_truth *work, const placed_body *placed,
                              .y0_px = INFINITY,
                              .x1_px = -INFINITY,
                              .y1_px = -INFINITY,
+                             .visible = 1.0,
                              .q_body_from_gcrf = body->q_body_from_gcrf};
     (void)bst_camera_project(camera, bst_quat_rotate(q_cam_from_gcrf, body->apparent), &out->x_px,
                              &out->y_px);
@@ -100,6 +170,9 @@ static void project(bst_shape_truth *work, const placed_body *placed,
         out->y1_px = fmax(out->y1_px, p->y);
     }
     out->size_px = largest_extent(work->hull, bst_polygon_hull(work->points, count, work->hull));
+    if (placed->hidden.count > 0) {
+        project_visible(work, placed, pose, out);
+    }
 }
 
 /* Cells across the image of a body: a sixteenth of a pixel, within limits. */
@@ -117,7 +190,8 @@ static bst_status find_light(bst_ctx *ctx, bst_shape_truth *work, const placed_b
     const bst_resolved_view view = {
         .q_image_from_body = bst_quat_mul(q, bst_quat_conj(body->q_body_from_gcrf)),
         .origin_m = bst_vec3_scale(bst_quat_rotate(q, body->apparent), body->range_m),
-        .scale_rad = bst_camera_scale_rad(placed->camera)};
+        .scale_rad = bst_camera_scale_rad(placed->camera),
+        .hidden = placed->hidden.count > 0 ? &placed->hidden : NULL};
     const bst_resolved_light light = {.sun = body->aim.sun,
                                       .sun_radius_rad = body->sun_radius_rad,
                                       .earthlight = body->earth ? &placed->earthlight : NULL,
@@ -129,8 +203,18 @@ static bst_status find_light(bst_ctx *ctx, bst_shape_truth *work, const placed_b
         return BST_OK;
     }
     double across = fmax(fmax(high[0] - low[0], high[1] - low[1]), 1e-6);
-    BST_TRY(bst_resolved_begin(ctx, resolved, low, high, across / cells_across(across)));
-    BST_TRY(bst_resolved_add(ctx, resolved, pose, &view, &light, 1.0, NULL));
+    double cell_px = across / cells_across(across), all, seen;
+    if (view.hidden) {
+        bst_resolved_view whole = view;
+        whole.hidden = NULL;
+        BST_TRY(bst_resolved_begin(ctx, resolved, low, high, cell_px));
+        BST_TRY(bst_resolved_add(ctx, resolved, pose, &whole, &light, 1.0, &all));
+    }
+    BST_TRY(bst_resolved_begin(ctx, resolved, low, high, cell_px));
+    BST_TRY(bst_resolved_add(ctx, resolved, pose, &view, &light, 1.0, &seen));
+    if (view.hidden) {
+        out->visible = all > 0.0 ? seen / all : 0.0;
+    }
     double sigma_px = sqrt(pow(bst_camera_psf_sigma_px(placed->camera), 2.0) + 1.0 / 12.0);
     BST_TRY(bst_shape_light_measure(ctx, &work->light, bst_resolved_image_of(resolved), sigma_px,
                                     &figures));
@@ -166,13 +250,17 @@ bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_c
         BST_TRY(reserve(ctx, work, pose->satellite->vertex_count));
         bst_source_body_at(source, 0.5, &placed.state, &placed.earthlight);
         bst_source_body_set_pose(source, &placed.state, pose);
+        const bst_body_limb_view limb = {placed.q_cam_from_gcrf, bst_camera_scale_rad(camera)};
+        (void)bst_body_limb_hidden(source, 0.5, &limb, &placed.hidden);
         bst_truth_shape *shape = &truth->shapes[truth->shape_count++];
         project(work, &placed, pose, shape);
         shape->item = i;
         shape->x_light_px = shape->x_px;
         shape->y_light_px = shape->y_px;
         BST_TRY(find_light(ctx, work, &placed, pose, work->images[slot], shape));
-        truth->items[i].snr *= shape->snr_ratio;
+        truth->items[i].electrons *= shape->visible;
+        truth->items[i].snr *= shape->visible * shape->snr_ratio;
+        truth->items[i].flags |= shape->visible > 0.0 ? 0 : BST_TRUTH_OCCULTED;
         truth->items[i].x_centroid_px += shape->x_light_px - shape->x_px;
         truth->items[i].y_centroid_px += shape->y_light_px - shape->y_px;
     }

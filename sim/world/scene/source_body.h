@@ -22,6 +22,10 @@ typedef struct bst_scene_source_body {
     double seconds[2];    /* start and end, after the epoch */
     const double *burn_s; /* [burn_count] starts of the object's burns, for joints; borrowed */
     int burn_count;
+    bool limb;                 /* the Earth's limb may hide a part: the next three are set */
+    bst_scene_source_path eye; /* geocentric places of the observer during these times */
+    bst_vec3 lag_m;            /* object at emission minus object at reception */
+    bst_vec3 pole;             /* the Earth's axis, unit */
     bool earthshine;
     double earth_albedo;
     bst_resolved_gain gain[BST_SATELLITE_MATERIALS_MAX];
