@@ -195,7 +195,7 @@ static bst_status draw_group(run *r, int g) {
         image = r->poses->image[g - 1];
     }
     if (g > 0) {
-        BST_TRY(bst_resolved_begin(ctx, image, d->low, d->high, d->cell_px));
+        BST_TRY(bst_resolved_begin_box(ctx, image, d->low, d->high, d->cell_px));
     }
     BST_TRY(bst_resolved_begin_light(ctx, image, d->blurred));
     for (int k = g; k < d->count; k += BST_BODY_GROUPS) {

@@ -3,8 +3,10 @@
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "scenegen/smear/gauss_legendre.h"
+#include "scenegen/smear/smear_internal.h"
 
 /* Radius, px (or sigmas of a wider PSF), up to which discs use quadrature, which needs fewer
  * points. */
@@ -238,23 +240,32 @@ bst_status bst_extended_source_spread(bst_ctx *ctx, const bst_disc_points *point
                         "a disc of %d points on a path of %d nodes is too much", points->count,
                         list->count);
     }
-    bst_smear_node *items = malloc((size_t)(need > 0 ? need : 1) * sizeof *items);
-    if (!items) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %lld nodes of a disc", need);
+    size_t from_bytes = (size_t)list->count * sizeof *list->items;
+    bst_smear_node *from = malloc(from_bytes > 0 ? from_bytes : 1);
+    if (!from) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d nodes of a path", list->count);
+    }
+    if (from_bytes > 0) {
+        memcpy(from, list->items, from_bytes);
+    }
+    bst_status status = bst_smear_reserve(ctx, (void **)&list->items, &list->capacity,
+                                          need > 0 ? (int)need : 1, sizeof *list->items);
+    if (status != BST_OK) {
+        free(from);
+        return status;
     }
     size_t n = 0;
     for (int p = 0; p < points->count; p++) {
         for (int k = 0; k < list->count; k++) {
-            bst_smear_node node = list->items[k];
+            bst_smear_node node = from[k];
             node.p[0] += points->items[p].offset.x * stretch;
             node.p[1] += points->items[p].offset.y * stretch;
             node.weight *= points->items[p].share;
             node.variance += points->items[p].offset.z * stretch * stretch;
-            items[n++] = node;
+            list->items[n++] = node;
         }
     }
-    free(list->items);
-    list->items = items;
-    list->count = list->capacity = (int)need;
+    free(from);
+    list->count = (int)need;
     return BST_OK;
 }

@@ -341,7 +341,8 @@ static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_
     bool light_only = bst_resolved_may_add_light(b->satellite);
     double area_px2 = (high[0] - low[0]) * (high[1] - low[1]);
     b->cell_px = bst_body_cell_px(d, area_px2, light_only, b->blurred);
-    BST_TRY(bst_resolved_begin(ctx, b->image, low, high, b->cell_px));
+    BST_TRY((light_only ? bst_resolved_begin_box : bst_resolved_begin)(ctx, b->image, low, high,
+                                                                       b->cell_px));
     d->limb_px = bst_body_limb_px(s, d->light_e);
     double inverse = 1.0 / d->source->electrons_per_s;
     if (b->one_pose && d->source->rate) { /* the path has the rate */

@@ -22,9 +22,10 @@ bst_status bst_area_sums_begin(bst_ctx *ctx, bst_area_sums *s, int width, int he
     if (need > s->capacity) {
         free(s->cells);
         free(s->second);
-        s->cells = bst_pages_alloc(need * sizeof *s->cells);
-        s->second = bst_pages_alloc(need * sizeof *s->second);
-        s->capacity = s->cells && s->second ? need : 0;
+        size_t capacity = need + need / 4; /* as those of the image */
+        s->cells = bst_pages_alloc(capacity * sizeof *s->cells);
+        s->second = bst_pages_alloc(capacity * sizeof *s->second);
+        s->capacity = s->cells && s->second ? capacity : 0;
         if (s->capacity == 0) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an image of %d x %d cells", width,
                             height);
@@ -330,6 +331,7 @@ void bst_area_sums_finish(const bst_area_sums *s, double cell_rad, bst_resolved_
             double u = (image->x0 + i + 0.5) * cell_rad, c2 = 1.0 / (1.0 + u * u + v * v);
             double c3 = c2 * sqrt(c2), own = c3 * (light + (double)from[1].light);
             to->light = (float)own;
+            to->cover = 0.0F;
             to->moment_x = (float)(c3 * (double)from[1].x);
             to->moment_y = (float)(c3 * (row_y + (double)from[1].y));
             second->xx = (float)(own * EVEN + c3 * (double)from_2[1].xx);

@@ -87,8 +87,9 @@ bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred)
     s->kept_count = 0;
     if (cells > s->second_capacity) {
         free(s->second);
-        s->second = malloc(cells * sizeof *s->second);
-        s->second_capacity = s->second ? cells : 0;
+        size_t capacity = cells + cells / 4; /* as those of the image */
+        s->second = malloc(capacity * sizeof *s->second);
+        s->second_capacity = s->second ? capacity : 0;
         if (!s->second) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an image of %d x %d cells",
                             r->image.width, r->image.height);

@@ -72,8 +72,8 @@ bool bst_resolved_box(const bst_satellite_pose *pose, const bst_resolved_view *v
     return pose->satellite->vertex_count > 0;
 }
 
-bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *r, const double low[2],
-                              const double high[2], double cell_px) {
+bst_status bst_resolved_begin_box(bst_ctx *ctx, bst_resolved *r, const double low[2],
+                                  const double high[2], double cell_px) {
     assert(cell_px > 0.0 && high[0] >= low[0] && high[1] >= low[1]);
     bst_resolved_image *m = &r->image;
     double x0 = floor(low[0] / cell_px), y0 = floor(low[1] / cell_px);
@@ -94,9 +94,11 @@ bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *r, const double low[2]
     if (need > r->cell_capacity) {
         free(m->cells);
         free(m->part);
-        m->cells = malloc(need * sizeof *m->cells);
-        m->part = malloc(need * sizeof *m->part);
-        r->cell_capacity = m->cells && m->part ? need : 0;
+        size_t capacity =
+            need + need / 4; /* boxes of a body that turns differ from frame to frame */
+        m->cells = malloc(capacity * sizeof *m->cells);
+        m->part = malloc(capacity * sizeof *m->part);
+        r->cell_capacity = m->cells && m->part ? capacity : 0;
         if (r->cell_capacity == 0) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an image of %d x %d cells",
                             m->width, m->height);
@@ -104,6 +106,14 @@ bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *r, const double low[2]
     }
     m->second = NULL;
     m->surface_light = m->curved_light = m->reached_px[0] = m->reached_px[1] = 0.0;
+    return BST_OK;
+}
+
+bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *r, const double low[2],
+                              const double high[2], double cell_px) {
+    BST_TRY(bst_resolved_begin_box(ctx, r, low, high, cell_px));
+    bst_resolved_image *m = &r->image;
+    size_t need = (size_t)m->width * (size_t)m->height;
     memset(m->cells, 0, need * sizeof *m->cells);
     memset(m->part, -1, need * sizeof *m->part);
     return bst_visible_surface_begin(ctx, &r->surface, m->width, m->height);

@@ -105,6 +105,11 @@ bool bst_resolved_box(const bst_satellite_pose *pose, const bst_resolved_view *v
 bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *resolved, const double low[2],
                               const double high[2], double cell_px) BST_MUST_CHECK;
 
+/* The same for bst_resolved_begin_light alone: cells have no cover and no parts, and no values
+ * before bst_resolved_end_light. */
+bst_status bst_resolved_begin_box(bst_ctx *ctx, bst_resolved *resolved, const double low[2],
+                                  const double high[2], double cell_px) BST_MUST_CHECK;
+
 /* Adds a pose.
  *
  * Given:     pose    joints as bst_satellite_pose_set left them; its views are changed
@@ -124,7 +129,8 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_
 /* True if the functions below draw a model as bst_resolved_add does: it has no curved surfaces. */
 bool bst_resolved_may_add_light(const bst_satellite *satellite);
 
-/* Starts to sum the light of poses, after bst_resolved_begin. BST_ERR_MEMORY.
+/* Starts to sum the light of poses, after bst_resolved_begin or
+ * bst_resolved_begin_box. BST_ERR_MEMORY.
  *
  * Given:     blurred  there are so many poses that they blur the edges between facets of almost the
  *                     same light, whose second moments are then left out */
