@@ -105,6 +105,40 @@ static void drag_is_noise(void **state) {
     assert_true(noise[1] >= 0.0 && noise[1] < 1.0);
 }
 
+/* A state as good as 0.1 m says where the photocentre is, not the centre of mass: the filter is no
+ * surer of any of its components than that. */
+static void the_photocentre_is_no_centre_of_mass(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_elements *sets = NULL;
+    int count = 0, used = 0;
+    const bst_elements_options options = {.skip_bad_sets = true};
+    const double none[BST_CUSTODY_STATE] = {0.0};
+    bst_assert_ok(&ctx, bst_elements_load(&ctx, CATALOGUE, &options, &sets, &count));
+    for (int i = 5; i < count; i += 23) {
+        bst_custody_orbit truth, orbit;
+        bst_custody_filter filter;
+        bst_custody_fix fix = {
+            .time_s = 7000.0,
+            .epoch_utc_jd = {sets[i].epoch_utc_jd1, sets[i].epoch_utc_jd2 + 7000.0 / BST_DAY_S}};
+        bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &sets[i], 0.0, 0.0, &truth));
+        if (!bst_custody_state(&truth, none, 7000.0, &fix.position_m, &fix.velocity_mps)) {
+            continue;
+        }
+        for (int k = 0; k < 6; k++) {
+            fix.covariance[k][k] = k < 3 ? 1e-2 : 1e-8;
+        }
+        if (bst_custody_start(&fix, 0.5, &orbit, &filter)) {
+            used++;
+            for (int k = 0; k < BST_CUSTODY_STATE; k++) {
+                assert_true(filter.p[k][k] > 0.2 * 0.2);
+            }
+        }
+    }
+    free(sets);
+    assert_true(used > 150);
+}
+
 static void no_orbit(void **state) {
     (void)state;
     double root[6][6];
@@ -122,6 +156,7 @@ static void no_orbit(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(errors_agree_with_covariances),
+                                       cmocka_unit_test(the_photocentre_is_no_centre_of_mass),
                                        cmocka_unit_test(drag_is_noise), cmocka_unit_test(no_orbit)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

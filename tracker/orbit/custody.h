@@ -164,7 +164,10 @@ typedef struct bst_custody_fix {
  * Returned:  elements without drag (B* 0), and a filter about them; false: no SGP4 orbit there, or
  *            the covariance is singular
  * Notes:     the covariance is carried to the elements by central differences of one standard
- *            deviation along the columns of its root; near the equator to osculating ones. */
+ *            deviation along the columns of its root, with the curvature along them; near the
+ * equator to osculating ones. The fit takes directions as those of the centre of mass, so that the
+ * photocentre's distance is added to the position, and times v / r to the velocity.
+ */
 bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_custody_orbit *orbit,
                        bst_custody_filter *filter);
 

@@ -51,8 +51,7 @@ static void distances(double a_m, const double at[N], const double from[N], doub
     }
 }
 
-/* Adds what a column of a covariance's root adds to that of the distances: half the difference of
- * both sides, squared. */
+/* Adds to a covariance half the difference of both sides of a column of a root, squared. */
 static void add_column(const double sides[N], double p[N][N]) {
     for (int i = 0; i < N; i++) {
         for (int j = 0; j < N; j++) {
@@ -92,6 +91,16 @@ bool bst_custody_difference(const bst_custody_orbit *orbit, const bst_custody_fi
     return true;
 }
 
+/* Adds the second moment of the curvature along a column: z^2 - 1 has a variance of 2. `bent`: mean
+ * of both sides at one standard deviation, from the middle. */
+static void add_curvature(const double bent[N], double p[N][N]) {
+    for (int i = 0; i < N; i++) {
+        for (int j = 0; j < N; j++) {
+            p[i][j] += 2.0 * bent[i] * bent[j];
+        }
+    }
+}
+
 /* Numbers of the orbit through a state: of its mean elements, or of osculating ones. */
 static bool numbers_through(bst_vec3 r, bst_vec3 v, bool osculating, bst_elements *elements,
                             double out[N]) {
@@ -110,19 +119,30 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
                        bst_custody_filter *filter) {
     assert(fix && orbit && filter);
     const bst_vec3 r = fix->position_m, v = fix->velocity_mps;
-    double root[N][N], unused[N];
+    const double turn_radps = bst_vec3_norm(v) / bst_vec3_norm(r);
+    double root[N][N], unused[N], covariance[N][N];
     bst_ctx quiet = {0};
+    memcpy(covariance, fix->covariance, sizeof covariance);
+    for (int k = 0; k < N; k++) {
+        const double off = photocentre_m * (k < 3 ? 1.0 : turn_radps);
+        covariance[k][k] += off * off;
+    }
     bst_elements elements = {.epoch_utc_jd1 = fix->epoch_utc_jd[0],
                              .epoch_utc_jd2 = fix->epoch_utc_jd[1]};
     memset(filter, 0, sizeof *filter);
-    if (!bst_custody_root(fix->covariance, root) ||
+    if (!bst_custody_root(fix->covariance, root) || !bst_custody_root(covariance, root) ||
         !numbers_through(r, v, false, &elements, unused) ||
         bst_custody_orbit_init(&quiet, &elements, -fix->time_s, photocentre_m, orbit) != BST_OK) {
         return false;
     }
     const bool osculating = bst_custody_osculates(&elements);
+    double middle[N];
+    bst_elements same = elements;
+    if (!numbers_through(r, v, osculating, &same, middle)) {
+        return false;
+    }
     for (int k = 0; k < N; k++) {
-        double side[2][N], column[N];
+        double side[2][N], column[N], off[2][N], bent[N];
         for (int s = 0; s < 2; s++) {
             const double to = s ? -1.0 : 1.0;
             const bst_vec3 dr = {root[0][k], root[1][k], root[2][k]};
@@ -132,10 +152,16 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
                                  &near, side[s])) {
                 return false;
             }
+            distances(orbit->a_m, side[s], middle, off[s]);
         }
         distances(orbit->a_m, side[0], side[1], column);
+        for (int i = 0; i < N; i++) {
+            bent[i] = 0.5 * (off[0][i] + off[1][i]);
+        }
         column[BST_CUSTODY_ALONG] -= column[BST_CUSTODY_DRIFT] * fix->time_s / BST_DAY_S;
+        bent[BST_CUSTODY_ALONG] -= bent[BST_CUSTODY_DRIFT] * fix->time_s / BST_DAY_S;
         add_column(column, filter->p);
+        add_curvature(bent, filter->p);
     }
     filter->noise_until_s = fix->time_s;
     return true;
