@@ -1,10 +1,24 @@
 #include "tests/link/link_scene.h"
 
+#include <arpa/inet.h>
+#include <sys/socket.h>
 #include <unistd.h>
 #include <zmq.h>
 
 #include "sim/core/wall_clock.h"
 #include "sim/link/crc32c.h"
+
+/* A port that nothing uses now: one by the number of the process may be in use by another program. */
+static int free_port(void) {
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t size = sizeof at;
+    int probe = socket(AF_INET, SOCK_STREAM, 0);
+    assert_true(probe >= 0);
+    assert_int_equal(bind(probe, (struct sockaddr *)&at, size), 0);
+    assert_int_equal(getsockname(probe, (struct sockaddr *)&at, &size), 0);
+    close(probe);
+    return ntohs(at.sin_port);
+}
 
 void scene_open(link_scene *s, bool tcp, double timeout_s, bst_link_silence on_timeout,
                 bool shared_memory) {
@@ -12,8 +26,7 @@ void scene_open(link_scene *s, bool tcp, double timeout_s, bst_link_silence on_t
     bst_test_template(s->folder, "boresight_link");
     assert_non_null(mkdtemp(s->folder));
     if (tcp) {
-        snprintf(s->address, sizeof s->address, "tcp://127.0.0.1:%d",
-                 30000 + (int)(getpid() % 20000));
+        snprintf(s->address, sizeof s->address, "tcp://127.0.0.1:%d", free_port());
     } else {
         snprintf(s->address, sizeof s->address, "ipc://%.80s/socket", s->folder);
     }
