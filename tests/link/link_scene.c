@@ -8,7 +8,8 @@
 #include "sim/core/wall_clock.h"
 #include "sim/link/crc32c.h"
 
-/* A port that nothing uses now: one by the number of the process may be in use by another program. */
+/* A port that nothing uses now: one by the number of the process may be in use by another program.
+ */
 static int free_port(void) {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     socklen_t size = sizeof at;
