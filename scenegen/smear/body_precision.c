@@ -107,7 +107,9 @@ bool bst_body_even(const bst_body_image_plan *p) {
 void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, bool *blurred) {
     const bst_smear *s = p->s;
     double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
-    double sigmas = (p->moved_px + FASTER * p->turned_px) / sigma_px;
+    /* the limb blurs no border of the body itself */
+    double blur = (p->moved_px + FASTER * p->turned_px) / sigma_px;
+    double sigmas = blur + FASTER * p->hidden_px / sigma_px;
     double poses = fmax(0.5 * sigmas, 4.0),
            missed_e = BRIGHTER * p->light_e / (8.0 * poses * poses);
     double allowed_e = KINK_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
@@ -118,7 +120,7 @@ void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, boo
         p->kinks_e =
             missed_e * bst_body_kinks_find(p->source, p->turn_rad, least_rad, pose, &p->glints);
     }
-    *blurred = sigmas >= BLURRED_SIGMAS;
+    *blurred = blur >= BLURRED_SIGMAS;
     double share = *blurred ? BLURRED_POSES_SHARE : POSES_SHARE;
     share = p->source->body->satellite->curved_count > 0 ? CURVED_POSES_SHARE : share;
     const bst_body_times_aim aim = {.sigmas = sigmas,
@@ -163,7 +165,8 @@ static double curved_sigma(const bst_body_image_plan *d, const bst_resolved_imag
 /* Error of one pose that turns, over the light of a pixel. */
 static double turn_error(const bst_body_image_plan *d) {
     double sigma2 = d->s->sigma_px * d->s->sigma_px + 1.0 / 12.0;
-    return d->turned_px * d->turned_px / 12.0 * 0.12 / sigma2;
+    double turned_px = d->turned_px + d->hidden_px;
+    return turned_px * turned_px / 12.0 * 0.12 / sigma2;
 }
 
 double bst_body_least_error(const bst_body_image_plan *next, const bst_smear_body *b,
@@ -191,7 +194,7 @@ void bst_body_set_error(bst_body_image_plan *d, bst_smear_body *b, double *light
     }
     *curved_e = fmin(m->curved_light * weights * electrons, *light_e);
     /* of one pose, which its motion spreads */
-    double swept_px = 1.0 + d->moved_px + d->turned_px;
+    double swept_px = 1.0 + d->moved_px + d->turned_px + d->hidden_px;
     d->pose_e = m->surface_light * weights * electrons;
     d->pose_e = fmax(fmin(d->pose_e, swept_px * *light_e), *light_e);
     if (b->one_pose) {

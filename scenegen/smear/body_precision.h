@@ -11,6 +11,7 @@ typedef struct bst_body_image_plan {
     const bst_scene_source *source;
     bst_body_times times;                 /* weights with the factors on the light */
     double moved_px, turn_rad, turned_px; /* motion in the exposure */
+    double hidden_px;                     /* motion of the Earth's limb across it */
     bst_body_glints glints;
     int glint_count;           /* without those of kinks, which follow */
     double kinks_e;            /* error by kinks without room, electrons */

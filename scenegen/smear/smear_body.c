@@ -416,8 +416,9 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
                              .light_e = per_px_e(s, source),
                              .curved_px = BST_RESOLVED_CURVED_PX};
     measure(s, source, &d.moved_px, &d.turn_rad);
-    d.turned_px = d.turn_rad * bst_smear_radius_px(s, source) + limb_moved_px(s, source);
-    b->one_pose = d.turned_px <= STILL_PX;
+    d.turned_px = d.turn_rad * bst_smear_radius_px(s, source);
+    d.hidden_px = limb_moved_px(s, source);
+    b->one_pose = d.turned_px + d.hidden_px <= STILL_PX;
     b->x0 = b->y0 = 0.0;
     if (b->one_pose) {
         (void)bst_smear_project(s, source, bst_los_track_attitude(&s->track, 0.5 * s->duration_s),

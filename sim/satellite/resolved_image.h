@@ -105,8 +105,8 @@ bool bst_resolved_box(const bst_satellite_pose *pose, const bst_resolved_view *v
 bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *resolved, const double low[2],
                               const double high[2], double cell_px) BST_MUST_CHECK;
 
-/* The same for bst_resolved_begin_light alone: cells have no cover and no parts, and no values
- * before bst_resolved_end_light. */
+/* The same for bst_resolved_begin_light alone: cells have no cover, and their parts are undefined,
+ * and no values before bst_resolved_end_light. */
 bst_status bst_resolved_begin_box(bst_ctx *ctx, bst_resolved *resolved, const double low[2],
                                   const double high[2], double cell_px) BST_MUST_CHECK;
 

@@ -19,8 +19,8 @@ static bool range_of(const bst_mtt *m, const bst_mtt_frame *frame, const bst_mtt
                      bst_orbit_measured_range *out) {
     for (int i = 0; i < frame->count && m->params.range_correlation_s > 0.0; i++) {
         const bst_mtt_detection *d = &frame->detections[i];
-        if (d->range_m > 0.0 && track->last_update_tick == frame->tick && track->x_px == d->x_px &&
-            track->y_px == d->y_px) {
+        if (d->range_m > 0.0 && d->range_sigma_m > 0.0 && track->last_update_tick == frame->tick &&
+            track->x_px == d->x_px && track->y_px == d->y_px) {
             *out = (bst_orbit_measured_range){d->range_m, d->range_sigma_m,
                                               m->params.range_correlation_s};
             return true;

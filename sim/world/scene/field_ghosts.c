@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/scene/body_limb.h"
 #include "sim/world/scene/skylight.h"
 
 /* Colours make a star brighter in the camera's band than its V magnitude says, at most by this. */
@@ -99,7 +100,8 @@ static bst_status add_of_source(bst_ctx *ctx, bst_field *field, const bst_field_
     const bst_camera *camera = field->camera;
     const bst_ghosts *ghosts = camera->ghost_images;
     double x, y, at[2];
-    if (source->occulted ||
+    bool hidden = source->body && bst_body_limb_behind(source, 0.5) > 0.0;
+    if (source->occulted || hidden ||
         !bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid), &x, &y)) {
         return BST_OK;
     }

@@ -70,11 +70,11 @@ typedef struct placed_body {
     bst_resolved_hidden hidden; /* by the Earth */
 } placed_body;
 
-/* Largest distances of points from an origin by direction. */
-enum { DIRECTIONS = 128 };
+/* Least and largest places of points along directions. */
+enum { DIRECTIONS = 64 };
 typedef struct extents {
-    double most[DIRECTIONS];
-    bool any;
+    bst_point2 along[DIRECTIONS]; /* of length 1 */
+    double least[DIRECTIONS], most[DIRECTIONS];
 } extents;
 
 /* Adds what the Earth leaves of a convex part to box and extents. `corners`: [count] places in the
@@ -96,17 +96,16 @@ static void add_visible(const placed_body *placed, bst_polygon_clip *clip,
             out->x1_px = fmax(out->x1_px, p.x);
             out->y1_px = fmax(out->y1_px, p.y);
             for (int d = 0; d < DIRECTIONS; d++) {
-                double a = 2.0 * BST_PI * d / DIRECTIONS;
-                double at = (p.x - out->x_px) * cos(a) + (p.y - out->y_px) * sin(a);
-                e->most[d] = e->any ? fmax(e->most[d], at) : at;
+                double at = p.x * e->along[d].x + p.y * e->along[d].y;
+                e->least[d] = fmin(e->least[d], at);
+                e->most[d] = fmax(e->most[d], at);
             }
-            e->any = true;
         }
     }
 }
 
 /* Box and extent of what the Earth leaves in sight of the body, by its convex parts. The extent is
- * right to 1 - cos(pi / DIRECTIONS). */
+ * right to 1 - cos(pi / (2 DIRECTIONS)). */
 static void project_visible(bst_shape_truth *work, const placed_body *placed,
                             bst_satellite_pose *pose, bst_truth_shape *out) {
     const bst_satellite *sat = pose->satellite;
@@ -114,7 +113,12 @@ static void project_visible(bst_shape_truth *work, const placed_body *placed,
     bst_vec3 centre = bst_vec3_scale(body->apparent, body->range_m);
     bst_quat back = bst_quat_conj(body->q_body_from_gcrf);
     double per = 1.0 / bst_camera_scale_rad(placed->camera);
-    extents e = {.any = false};
+    extents e;
+    for (int d = 0; d < DIRECTIONS; d++) {
+        e.along[d] = (bst_point2){cos(BST_PI * d / DIRECTIONS), sin(BST_PI * d / DIRECTIONS)};
+        e.least[d] = INFINITY;
+        e.most[d] = -INFINITY;
+    }
     out->x0_px = out->y0_px = INFINITY;
     out->x1_px = out->y1_px = -INFINITY;
     for (int o = 0; o < sat->occluder_count; o++) {
@@ -129,12 +133,12 @@ static void project_visible(bst_shape_truth *work, const placed_body *placed,
             add_visible(placed, &pose->clip, work->hull, count, &e, out);
         }
     }
-    out->size_px = e.any ? 0.0 : NAN;
-    for (int d = 0; d < DIRECTIONS / 2 && e.any; d++) {
-        out->size_px = fmax(out->size_px, e.most[d] + e.most[d + DIRECTIONS / 2]);
+    out->size_px = 0.0;
+    for (int d = 0; d < DIRECTIONS; d++) {
+        out->size_px = fmax(out->size_px, e.most[d] - e.least[d]);
     }
-    if (!e.any) {
-        out->x0_px = out->y0_px = out->x1_px = out->y1_px = NAN;
+    if (!(out->x0_px <= out->x1_px)) { /* nothing is left */
+        out->x0_px = out->y0_px = out->x1_px = out->y1_px = out->size_px = NAN;
     }
 }
 
@@ -181,6 +185,15 @@ static double cells_across(double across_px) {
     return fmin(fmax(16.0 * across_px, FEWEST), MOST);
 }
 
+/* Area of the cells of an image that the body covers. */
+static double covered(const bst_resolved_image *m) {
+    double sum = 0.0;
+    for (size_t i = 0; i < (size_t)m->width * (size_t)m->height; i++) {
+        sum += (double)m->cells[i].cover;
+    }
+    return sum;
+}
+
 /* Measures a body's light: centroid, width, and how its image differs from a point's. */
 static bst_status find_light(bst_ctx *ctx, bst_shape_truth *work, const placed_body *placed,
                              bst_satellite_pose *pose, bst_resolved *resolved,
@@ -203,17 +216,21 @@ static bst_status find_light(bst_ctx *ctx, bst_shape_truth *work, const placed_b
         return BST_OK;
     }
     double across = fmax(fmax(high[0] - low[0], high[1] - low[1]), 1e-6);
-    double cell_px = across / cells_across(across), all, seen;
+    double cell_px = across / cells_across(across), all, seen, cover = 0.0;
     if (view.hidden) {
         bst_resolved_view whole = view;
         whole.hidden = NULL;
         BST_TRY(bst_resolved_begin(ctx, resolved, low, high, cell_px));
         BST_TRY(bst_resolved_add(ctx, resolved, pose, &whole, &light, 1.0, &all));
+        cover = covered(bst_resolved_image_of(resolved));
     }
     BST_TRY(bst_resolved_begin(ctx, resolved, low, high, cell_px));
     BST_TRY(bst_resolved_add(ctx, resolved, pose, &view, &light, 1.0, &seen));
     if (view.hidden) {
-        out->visible = all > 0.0 ? seen / all : 0.0;
+        double share = all > 0.0   ? seen / all
+                       : cover > 0 ? covered(bst_resolved_image_of(resolved)) / cover
+                                   : 0.0;
+        out->visible = fmin(share, 1.0);
     }
     double sigma_px = sqrt(pow(bst_camera_psf_sigma_px(placed->camera), 2.0) + 1.0 / 12.0);
     BST_TRY(bst_shape_light_measure(ctx, &work->light, bst_resolved_image_of(resolved), sigma_px,
@@ -232,14 +249,32 @@ static bst_status find_light(bst_ctx *ctx, bst_shape_truth *work, const placed_b
     return BST_OK;
 }
 
+/* Checks whether the Earth hides all of a body. */
+static bool nothing_left(const bst_truth_shape *shape) {
+    const double LIGHT_ROUNDING = 1e-6;
+    return shape->visible < LIGHT_ROUNDING && isnan(shape->x0_px);
+}
+
+/* A body without a row of its own: in sight or not as a point is. */
+static void hide_whole(const bst_scene_source *source, bst_truth_item *item) {
+    if (bst_body_limb_behind(source, 0.5) > 0.0) {
+        item->electrons = item->snr = 0.0;
+        item->flags |= BST_TRUTH_OCCULTED;
+    }
+}
+
 bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_camera *camera,
                                 const bst_scene_source *sources, const int *source_of,
                                 bst_truth *truth) {
     assert(work && camera && truth && (truth->count == 0 || (sources && source_of)));
     truth->shape_count = 0;
-    for (int i = 0; i < truth->count && truth->shape_count < BST_TRUTH_SHAPES; i++) {
+    for (int i = 0; i < truth->count; i++) {
         const bst_scene_source *source = &sources[source_of[i]];
         if (!source->body) {
+            continue;
+        }
+        if (truth->shape_count == BST_TRUTH_SHAPES) {
+            hide_whole(source, &truth->items[i]);
             continue;
         }
         int slot;
@@ -260,7 +295,7 @@ bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_c
         BST_TRY(find_light(ctx, work, &placed, pose, work->images[slot], shape));
         truth->items[i].electrons *= shape->visible;
         truth->items[i].snr *= shape->visible * shape->snr_ratio;
-        truth->items[i].flags |= shape->visible > 0.0 ? 0 : BST_TRUTH_OCCULTED;
+        truth->items[i].flags |= nothing_left(shape) ? BST_TRUTH_OCCULTED : 0;
         truth->items[i].x_centroid_px += shape->x_light_px - shape->x_px;
         truth->items[i].y_centroid_px += shape->y_light_px - shape->y_px;
     }

@@ -24,12 +24,11 @@ void bst_shape_truth_free(bst_shape_truth *work);
  * Given:     sources    of the field query
  *            source_of  [truth->count] index of each item's source
  *            truth      header and items
- * Returned:  truth->shapes, and x_centroid_px, y_centroid_px and snr of their items
- * Errors:    BST_ERR_MEMORY
- * Notes:     corners are projected in perspective; the light is that of the middle of the exposure,
- *            from an image of up to 256 cells across. The SNR is lowered by the width of the
- *            image. With a rolling shutter the attitude of the
- *            camera is that of the middle of the exposure. */
+ * Returned:  truth->shapes, and of their items x_centroid_px, y_centroid_px, electrons, snr and,
+ * where the Earth hides all of the body, BST_TRUTH_OCCULTED Errors:    BST_ERR_MEMORY Notes:
+ * corners are projected in perspective; the light is that of the middle of the exposure, from an
+ * image of up to 256 cells across. The SNR is lowered by the width of the image. With a rolling
+ * shutter the attitude of the camera is that of the middle of the exposure. */
 bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_camera *camera,
                                 const bst_scene_source *sources, const int *source_of,
                                 bst_truth *truth) BST_MUST_CHECK;
