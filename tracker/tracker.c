@@ -245,6 +245,7 @@ static int collect_objects(bst_tracker *t, const bst_detections *d,
             continue;
         }
         bool bright = isfinite(item->v_mag) && isfinite(item->v_mag_sigma);
+        bool whole = extended && !(item->flags & BST_DETECTION_EDGE); /* else too small */
         assert(count < t->max_detections);
         t->detections[count++] =
             (bst_mtt_detection){.sky = direction_of(t, item, attitude, light),
@@ -255,8 +256,8 @@ static int collect_objects(bst_tracker *t, const bst_detections *d,
                                 .snr = item->snr,
                                 .length_rad = extended ? 0.0 : scale * item->length_px,
                                 .width_px = item->width_px,
-                                .range_m = extended ? item->extent.range_m : 0.0,
-                                .range_sigma_m = extended ? item->extent.range_sigma_m : 0.0};
+                                .range_m = whole ? item->extent.range_m : 0.0,
+                                .range_sigma_m = whole ? item->extent.range_sigma_m : 0.0};
     }
     return count;
 }

@@ -118,12 +118,13 @@ static void read_sources(bst_lost_in_space *s, const bst_lost_in_space_frame *fr
     bst_heapsort_indices(s->order, count, brighter, frame->items);
     for (int i = 0; i < count; i++) {
         const bst_detection *d = &frame->items[s->order[i]];
-        double least = SYSTEMATIC_PX * SYSTEMATIC_PX;
+        const double least = SYSTEMATIC_PX * SYSTEMATIC_PX, xx = fmax(d->cov_xx, 0.0),
+                     yy = fmax(d->cov_yy, 0.0), most = sqrt(xx * yy);
         s->sources[i] = (source){.x_px = d->x_px,
                                  .y_px = d->y_px,
-                                 .cov_xx = fmax(d->cov_xx, 0.0) + least,
-                                 .cov_xy = d->cov_xy,
-                                 .cov_yy = fmax(d->cov_yy, 0.0) + least,
+                                 .cov_xx = xx + least,
+                                 .cov_xy = fmin(fmax(d->cov_xy, -most), most),
+                                 .cov_yy = yy + least,
                                  .cam = bst_camera_unproject(s->camera, d->x_px, d->y_px),
                                  .mag = -2.5 * log10(fmax(d->flux_e, 1e-9))};
     }

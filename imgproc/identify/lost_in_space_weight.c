@@ -61,10 +61,10 @@ static double share_of_detection(const bst_lost_in_space *s, const int quad[4], 
 
 /* Likelihood of the brightnesses of the quad's stars over its mean over all their permutations,
  * which are equally probable by chance; the zero point is the same for all. */
-static double brightness_of_quad(const bst_lost_in_space *s, const int quad[4]) {
+static double brightness_of_quad(const bst_lost_in_space *s, const int quad[4], int sources) {
     double v[4], sum = 0.0;
     for (int i = 0; i < 4; i++) {
-        if (quad[i] < 0 || s->star_of[quad[i]] < 0) {
+        if (quad[i] < 0 || quad[i] >= sources || s->star_of[quad[i]] < 0) {
             return 1.0;
         }
         v[i] = s->v_mag[s->star_of[quad[i]]] / MAG_SIGMA;
@@ -93,7 +93,7 @@ double bst_lost_in_space_log_ratio(const bst_lost_in_space_attempt *a, const int
                                    int predicted, int sources, bst_lost_in_space_result *out) {
     bst_lost_in_space *s = a->s;
     const double zero_mag = zero_point(s, quad, sources);
-    double area_px2 = 0.0, sum = log(brightness_of_quad(s, quad));
+    double area_px2 = 0.0, sum = log(brightness_of_quad(s, quad, sources));
     out->predicted = out->matched = 0;
     for (int i = 0; i < sources; i++) {
         area_px2 += is_of(quad, i) ? 0.0 : s->area_px2[i];

@@ -112,6 +112,9 @@ static bool is_certain(const attempt *a) {
     choose_matched(a, chosen);
     const double votes = bst_streak_finder_votes(a->finder, chosen, &a->streak);
     const double margin = a->streak.ends_margin;
+    if (!isfinite(votes)) { /* too short for other ends */
+        return margin > LEAST_MARGIN;
+    }
     return votes < CERTAIN_VOTES || (votes < CLEAR_VOTES && margin > LESS_MARGIN) ||
            (votes < 0.0 && margin > LEAST_MARGIN);
 }

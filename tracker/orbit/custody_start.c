@@ -91,12 +91,11 @@ bool bst_custody_difference(const bst_custody_orbit *orbit, const bst_custody_fi
     return true;
 }
 
-/* Adds the second moment of the curvature along a column: z^2 - 1 has a variance of 2. `bent`: mean
- * of both sides at one standard deviation, from the middle. */
-static void add_curvature(const double bent[N], double p[N][N]) {
+/* Adds a share of a second moment. */
+static void add_moment(double share, const double of[N], double p[N][N]) {
     for (int i = 0; i < N; i++) {
         for (int j = 0; j < N; j++) {
-            p[i][j] += 2.0 * bent[i] * bent[j];
+            p[i][j] += share * of[i] * of[j];
         }
     }
 }
@@ -136,7 +135,7 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
         return false;
     }
     const bool osculating = bst_custody_osculates(&elements);
-    double middle[N];
+    double middle[N], shift[N] = {0.0};
     bst_elements same = elements;
     if (!numbers_through(r, v, osculating, &same, middle)) {
         return false;
@@ -161,8 +160,13 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
         column[BST_CUSTODY_ALONG] -= column[BST_CUSTODY_DRIFT] * fix->time_s / BST_DAY_S;
         bent[BST_CUSTODY_ALONG] -= bent[BST_CUSTODY_DRIFT] * fix->time_s / BST_DAY_S;
         add_column(column, filter->p);
-        add_curvature(bent, filter->p);
+        /* bent z^2 has a variance of 2 bent^2 and a mean of bent, which the middle lacks */
+        add_moment(2.0, bent, filter->p);
+        for (int i = 0; i < N; i++) {
+            shift[i] += bent[i];
+        }
     }
+    add_moment(1.0, shift, filter->p);
     filter->noise_until_s = fix->time_s;
     return true;
 }
