@@ -15,6 +15,7 @@ import sys
 import unittest
 
 import jsonschema
+from astropy.io import fits
 
 CC, BUILD = sys.argv[2:4]
 del sys.argv[2:4]
@@ -26,6 +27,18 @@ EXAMPLES = ("plugin_detector/box_detector.c", "plugin_compensator/leaky.c",
 M = runs.SENSOR + "/modules"
 # 0.2 s, so that stars are points while the camera follows the belt
 SHORT = f"{M}/control/exposure_s=0.2"
+
+# a stage of frames that writes what it is given into the first pixels
+GIVEN = """    const int given[] = {f->width, f->height, f->binning, f->bits, f->window.x0, f->window.y0,
+                         f->window.width, f->window.height, (int)(100 * f->start_s + 0.5),
+                         (int)(100 * f->end_s + 0.5), (int)f->exposure_id};
+    for (size_t i = 0; i < sizeof given / sizeof *given; i++) {
+        pixels[i] = (uint16_t)given[i];
+    }
+    return BST_OK;
+}
+
+/* What a saved"""
 
 
 class Plugins(unittest.TestCase):
@@ -44,6 +57,7 @@ class Plugins(unittest.TestCase):
         jobs.append(cls.start("other.c", detector.replace("BST_STAGE_DETECTOR", '"telescope"')))
         jobs.append(cls.start("aged.c", cls.text["stare_at.c"].replace("BST_MODULE_ABI", "2")))
         jobs.append(cls.start("empty.c", "extern int a;\nint a;\n"))
+        jobs.append(cls.start("given.c", cls.text["banding.c"].replace("    return BST_OK;\n}\n\n/* What a saved", GIVEN)))
         jobs.append(cls.start("mad.c", detector.replace("d->snr =", "d->x_px = NAN; d->snr =")))
         jobs.append(cls.start("mad_law.c", cls.text["leaky.c"].replace("return s->kp * error", "return NAN * error")))
         jobs.append(cls.start("mad_aim.c", cls.text["stare_at.c"].replace(
@@ -111,6 +125,20 @@ class Plugins(unittest.TestCase):
             self.call("export", "run", "--observations", "tdm", "--out", "angles")
         finally:
             os.rename(os.path.join(self.work, "gone.so"), os.path.join(self.work, "banding.so"))
+
+    def test_given_to_a_frame_stage(self):
+        """A frame that is not square, binned and in a window."""
+        out = os.path.join(self.work, "given")
+        runs.run(self.scenario, out, SHORT, runs.SENSOR + "/exposure/window_px=[24, 40, 300, 228]", runs.SENSOR + "/exposure/binning=2",
+                 "/record/compression=none", M + '/scenegen/frame_stage={"plugin": "given.so"}', duration=4)
+        with fits.open(out + "/frames.fits") as hdus:
+            images = [h for h in hdus if h.data is not None and h.data.ndim == 2]
+            self.assertGreater(len(images), 2)
+            for k, image in enumerate(images):
+                start, end = image.data[0, 8:10]
+                self.assertEqual(list(image.data[0, :8]), [150, 114, 2, 16, 24, 40, 300, 228])
+                self.assertEqual(image.data[0, 10], k)
+                self.assertAlmostEqual(end - start, 100 * image.header["EXPTIME"], delta=1)
 
     def test_whole_module(self):
         control = '{"plugin": "stare_at.so", "ra_deg": 252.36, "dec_deg": -8.82}'
