@@ -196,8 +196,8 @@ static bst_status draw_group(run *r, int g) {
     }
     if (g > 0) {
         BST_TRY(bst_resolved_begin_box(ctx, image, d->low, d->high, d->cell_px));
+        BST_TRY(bst_resolved_begin_light_beside(ctx, image, d->image, d->blurred));
     }
-    BST_TRY(bst_resolved_begin_light(ctx, image, d->blurred));
     for (int k = g; k < d->count; k += BST_BODY_GROUPS) {
         BST_TRY(d->draw(ctx, d->user, k, pose, image));
     }
@@ -215,6 +215,7 @@ static void draw_groups(void *user, int begin, int end) {
 bst_status bst_body_poses_draw(bst_ctx *ctx, bst_body_poses *poses, const bst_body_drawing *d) {
     run r = {.poses = poses, .drawing = d};
     int groups = d->count < BST_BODY_GROUPS ? d->count : BST_BODY_GROUPS;
+    BST_TRY(bst_resolved_begin_light(ctx, d->image, d->blurred)); /* others borrow from it */
     bst_parallel_for(d->pool, groups, 1, draw_groups, &r);
     for (int g = 0; g < groups; g++) {
         if (r.status[g] != BST_OK) {

@@ -35,8 +35,9 @@ static box box_of(const bst_facet_net *net, int facet, double margin) {
         bst_vec3 p = corner_of(net, i);
         const double at[3] = {p.x, p.y, p.z};
         for (int k = 0; k < 3; k++) {
-            b.low[k] = fmin(b.low[k], at[k] - margin);
-            b.high[k] = fmax(b.high[k], at[k] + margin);
+            double low = at[k] - margin, high = at[k] + margin;
+            b.low[k] = low < b.low[k] ? low : b.low[k];
+            b.high[k] = high > b.high[k] ? high : b.high[k];
         }
     }
     return b;
@@ -119,8 +120,8 @@ static side side_of(const bst_facet_net *net, int plane, int facet) {
     double same = SAME * net->satellite->radius_m, least = INFINITY, most = -INFINITY;
     for (int i = net->first[facet]; i < net->first[facet + 1]; i++) {
         double height = height_of(net, plane, corner_of(net, i));
-        least = fmin(least, height);
-        most = fmax(most, height);
+        least = height < least ? height : least;
+        most = height > most ? height : most;
     }
     return least >= -same && most <= same   ? IN_THE_PLANE
            : least >= -same || most <= same ? ON_ONE_SIDE
@@ -214,10 +215,13 @@ static int shared_corners(const bst_facet_net *net, int f, int g) {
 static bool may_touch(const bst_facet_net *net, int facet, int plane) {
     double same = SAME * net->satellite->radius_m;
     int in_plane = 0;
+    if (shared_corners(net, facet, plane) >= 2) {
+        return false;
+    }
     for (int i = net->first[facet]; i < net->first[facet + 1]; i++) {
         in_plane += fabs(height_of(net, plane, corner_of(net, i))) <= same;
     }
-    return in_plane >= 2 && shared_corners(net, facet, plane) < 2;
+    return in_plane >= 2;
 }
 
 static bool boxes_meet(const box *a, const box *b) {

@@ -1,5 +1,6 @@
 /* Light of a pose by cell, as exact areas: facets that nothing hides by their edges, others by the
  * polygons that are left of them. */
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,7 +22,9 @@ enum { EDGES = 512 };
 static const double EARTH_LOW = 0.05;
 
 void bst_resolved_areas_free(bst_resolved_areas *s) {
-    bst_facet_net_free(&s->net);
+    if (!s->borrowed) {
+        bst_facet_net_free(&s->net);
+    }
     bst_facet_layers_free(&s->eye);
     bst_area_sums_free(&s->sums);
     for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
@@ -52,12 +55,17 @@ bool bst_resolved_may_add_light(const bst_satellite *satellite) {
     return true;
 }
 
-/* Makes the net and the arrays by facet. */
-static bst_status make(bst_ctx *ctx, bst_resolved *r) {
+/* Makes the net, or borrows that of another image (NULL: none), and the arrays by facet. */
+static bst_status make(bst_ctx *ctx, bst_resolved *r, const bst_resolved *lender) {
     bst_resolved_areas *s = &r->areas;
     size_t facets = (size_t)r->satellite->facet_count + 1;
     bst_resolved_areas_free(s);
-    BST_TRY(bst_facet_net_make(ctx, r->satellite, &s->net));
+    if (lender) {
+        s->borrowed = true;
+        s->net = lender->areas.net;
+    } else {
+        BST_TRY(bst_facet_net_make(ctx, r->satellite, &s->net));
+    }
     s->planes = calloc(facets, sizeof *s->planes);
     s->middles = calloc(facets, sizeof *s->middles);
     s->even = calloc(facets, sizeof *s->even);
@@ -77,11 +85,12 @@ static bst_status make(bst_ctx *ctx, bst_resolved *r) {
                               r->satellite->facet_count);
 }
 
-bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred) {
+/* Starts to sum the light; lender: see make. */
+static bst_status begin(bst_ctx *ctx, bst_resolved *r, const bst_resolved *lender, bool blurred) {
     bst_resolved_areas *s = &r->areas;
     size_t cells = (size_t)r->image.width * (size_t)r->image.height;
     if (!s->made) {
-        BST_TRY(make(ctx, r));
+        BST_TRY(make(ctx, r, lender));
     }
     s->faint = blurred ? FAINT : 0.0;
     s->kept_count = 0;
@@ -96,6 +105,16 @@ bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred)
         }
     }
     return bst_area_sums_begin(ctx, &r->areas.sums, r->image.width, r->image.height);
+}
+
+bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred) {
+    return begin(ctx, r, NULL, blurred);
+}
+
+bst_status bst_resolved_begin_light_beside(bst_ctx *ctx, bst_resolved *r, const bst_resolved *first,
+                                           bool blurred) {
+    assert(first->areas.made && first->satellite == r->satellite);
+    return begin(ctx, r, first, blurred);
 }
 
 /* Finds planes and middles of the facets. */

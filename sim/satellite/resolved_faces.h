@@ -40,6 +40,7 @@ typedef struct bst_resolved_kept {
 /* Work memory of light by exact areas (resolved_areas.c): zero-initialise. */
 typedef struct bst_resolved_areas {
     bst_facet_net net;
+    bool borrowed; /* the net's arrays are those of another image of the same model */
     bst_facet_layers eye, lit[BST_RESOLVED_LIGHTS];
     bst_area_sums sums;
     bst_resolved_plane *planes;        /* by facet, of the current pose */

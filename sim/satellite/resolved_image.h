@@ -137,6 +137,12 @@ bool bst_resolved_may_add_light(const bst_satellite *satellite);
 bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *resolved,
                                     bool blurred) BST_MUST_CHECK;
 
+/* The same for an image that bst_resolved_join_light adds to `first`, in which it has begun: the
+ * edges of the model's facets are not found again, but borrowed from `first`, which must be freed
+ * or made for another model only when this image is drawn no more. BST_ERR_MEMORY. */
+bst_status bst_resolved_begin_light_beside(bst_ctx *ctx, bst_resolved *resolved,
+                                           const bst_resolved *first, bool blurred) BST_MUST_CHECK;
+
 /* Adds the light of a pose to these sums, as bst_resolved_add but fast for models of many facets,
  * with second moments and without cover and parts. `light` is not NULL. BST_ERR_MEMORY. */
 bst_status bst_resolved_add_light(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_pose *pose,
