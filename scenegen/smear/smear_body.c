@@ -298,6 +298,8 @@ static bst_status draw(bst_ctx *ctx, const bst_body_image_plan *d, int k, bool l
     bst_resolved_view view;
     double weight = d->times.weight[k];
     pose_at(d->s, d->source, d->times.u[k], pose, &view, &light, &earthlight);
+    light.shadow_at[0] = d->times.shadow_at[k][0];
+    light.shadow_at[1] = d->times.shadow_at[k][1];
     view.curved_px = d->curved_px;
     view.limb_px = fmin(d->limb_px, d->curved_px);
     return light_only ? bst_resolved_add_light(ctx, image, pose, &view, &light, weight)
@@ -322,9 +324,11 @@ static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_
     if (b->one_pose && d->source->rate) { /* the path has the rate */
         inverse /= bst_scene_source_rate_at(d->source, 0.5);
     }
+    double factor = 1.0;
     for (int k = 0; k < d->times.count; k++) {
-        double factor;
-        BST_TRY(find_factor(ctx, s, b, d->source, d->times.u[k], &factor));
+        if (k == 0 || d->times.u[k] != d->times.u[k - 1]) {
+            BST_TRY(find_factor(ctx, s, b, d->source, d->times.u[k], &factor));
+        }
         d->times.weight[k] *= factor * inverse;
     }
     if (light_only) {
@@ -365,6 +369,10 @@ static bst_status draw_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_
     if (!b->one_pose) {
         bst_body_choose_poses(d, b->pose, &b->blurred);
     }
+    if (d->sun_rule > 0) {
+        d->sun_rule = bst_body_penumbra_expand(&d->times, d->sun_rule);
+    }
+    b->penumbrae = d->sun_rule > 0;
     *there = find_box(s, b, d->source, &d->times, low, high);
     if (!*there) {
         return BST_OK;
@@ -377,7 +385,7 @@ static bst_status draw_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_
 
 /* Error of all nodes, over their share of the tolerance. */
 static double neighbours_of(const bst_smear_body *b) {
-    return b->one_pose || b->blurred ? NEIGHBOURS : NEIGHBOURS_IN_POSES;
+    return (b->one_pose && !b->penumbrae) || b->blurred ? NEIGHBOURS : NEIGHBOURS_IN_POSES;
 }
 
 /* Makes the image of a source for the frame: again, finer, if its light turns out to be so bright
@@ -409,9 +417,11 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
         }
         bst_body_set_error(&d, b, &light_e, &curved_e);
         double limit = 1.0 - IMAGE_SHARE * neighbours_of(b);
+        int sun_rule = bst_body_choose_sun(&d, b, limit * s->options.tolerance_sigma);
         d.light_e = fmax(light_e, 1.1 * d.light_e);
         d.curved_px = bst_body_curved_px(s, curved_e);
         d.limb_px = bst_body_limb_px(s, d.light_e);
+        d.sun_rule = sun_rule;
         if (b->sigma <= limit * s->options.tolerance_sigma ||
             (round > 0 && b->sigma > WORTH * before) ||
             bst_body_least_error(&d, b, curved_e) > WORTH * b->sigma) {
