@@ -61,6 +61,10 @@ static const double BOTH_BORDERS = 2.0;
 /* Light of the pixel with the largest error, over that beside the border: body_precision.c. */
 static const double BORDER_LIGHT = 0.1;
 
+/* Error of a border that moves across itself, over the square of half the width of its penumbra and
+ * the motion: half of the disc's second moment, 0.225, times the extremum 0.4 of a Gaussian. */
+static const double SWEPT = 0.045;
+
 int bst_body_sun_points(int rule) {
     return rules[rule].points;
 }
@@ -70,12 +74,16 @@ double bst_body_sun_error(int rule, double half_width) {
 }
 
 double bst_body_penumbra_sigma(const bst_resolved_image *m, int rule, double electrons,
-                               double sigma_px, double dark_variance_e2) {
+                               double sigma_px, double swept, double dark_variance_e2) {
     double worst = 0.0;
     for (int i = 0; i < BST_RESOLVED_PENUMBRAE; i++) {
         const bst_resolved_penumbra *p = &m->penumbrae[i];
-        double light_e = electrons * p->light;
-        double error = BOTH_BORDERS * bst_body_sun_error(rule, p->px / sigma_px);
+        /* the widest with that light has at least the error of each, which grows with the square of
+         * the width or faster */
+        double light_e = p->px > 0.0 ? electrons * p->light_px2 / (p->px * p->px) : 0.0;
+        double width = p->px / sigma_px, error = bst_body_sun_error(rule, width);
+        error = swept > 0.0 ? fmin(error, SWEPT * width * width / swept) : error;
+        error *= BOTH_BORDERS;
         worst = fmax(worst, error * light_e / sqrt(BORDER_LIGHT * light_e + dark_variance_e2));
     }
     return worst;

@@ -19,9 +19,10 @@ double bst_body_sun_error(int rule, double half_width);
 /* Error of an image without penumbrae, or with those of a quadrature, sigma of a pixel.
  *
  * Given:     electrons  of one unit of the image's light
- *            sigma_px   of the PSF and the pixel together */
+ *            sigma_px   of the PSF and the pixel together
+ *            swept      motion of the borders in the exposure, PSF sigmas; 0: at rest */
 double bst_body_penumbra_sigma(const bst_resolved_image *image, int rule, double electrons,
-                               double sigma_px, double dark_variance_e2);
+                               double sigma_px, double swept, double dark_variance_e2);
 
 /* Replaces each pose by those with the points of a quadrature, or of the finest one for which there
  * is room. Returned: that quadrature. */

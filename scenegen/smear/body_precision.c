@@ -37,6 +37,9 @@
 /* Share for penumbrae at least, over that of the poses, which gives it up if the image takes more
  * than the centre of the Sun. */
 #define PENUMBRA_SHARE 0.5
+/* Quadratures of the Sun's disc for models with curved surfaces, of which a pose takes some 0.3 s:
+ * up to 32 points. */
+#define CURVED_SUN_RULES 5
 /* Light of the brightest facet over the mean that is expected, at most. */
 #define BRIGHTER 4.0
 /* Least error of borders of curved surfaces and between their parts that is asked for, px. */
@@ -145,8 +148,9 @@ double bst_body_shadow_sigma(const bst_body_image_plan *d, const bst_smear_body 
         weights += d->times.weight[k];
     }
     double electrons = d->source->electrons_per_s * d->s->duration_s * weights;
+    double swept = b->blurred ? (d->moved_px + FASTER * d->turned_px) / sigma_px : 0.0;
     return bst_body_penumbra_sigma(bst_resolved_image_of(b->image), rule, electrons, sigma_px,
-                                   d->s->dark_variance_e2);
+                                   swept, d->s->dark_variance_e2);
 }
 
 int bst_body_choose_sun(const bst_body_image_plan *d, const bst_smear_body *b,
@@ -155,7 +159,12 @@ int bst_body_choose_sun(const bst_body_image_plan *d, const bst_smear_body *b,
     double sigma = bst_body_shadow_sigma(d, b, rule);
     double least = PENUMBRA_SHARE * poses_share(d, b->blurred) * d->s->options.tolerance_sigma;
     double left = fmax(allowed_sigma - (b->sigma - sigma), least);
-    while (sigma > left && rule + 1 < BST_BODY_SUN_RULES) {
+    if (b->blurred) {
+        return rule; /* as many poses again for each point: too slow for what is left */
+    }
+    int rules =
+        d->source->body->satellite->curved_count > 0 ? CURVED_SUN_RULES : BST_BODY_SUN_RULES;
+    while (sigma > left && rule + 1 < rules) {
         sigma = bst_body_shadow_sigma(d, b, ++rule);
     }
     return rule;
@@ -206,7 +215,6 @@ double bst_body_least_error(const bst_body_image_plan *next, const bst_smear_bod
     }
     return error * next->light_e / border_noise_e(s, next->light_e) +
            curved_sigma(next, bst_resolved_image_of(b->image), curved_e) +
-           bst_body_shadow_sigma(next, b, next->sun_rule) +
            STAMP_SHARE * s->options.tolerance_sigma;
 }
 

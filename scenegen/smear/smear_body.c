@@ -408,9 +408,9 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
         bst_body_glints_find(source, &b->glints, d.turn_rad, b->pose, &d.glints);
         d.glint_count = d.glints.count;
     }
-    b->sigma = 0.0;
+    double before = 0.0;
     for (int round = 0; round < ROUNDS; round++) {
-        double light_e, curved_e, before = b->sigma;
+        double light_e, curved_e;
         BST_TRY(draw_image(ctx, s, b, &d, there));
         if (!*there || b->empty) {
             return BST_OK;
@@ -421,12 +421,17 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
         d.light_e = fmax(light_e, 1.1 * d.light_e);
         d.curved_px = bst_body_curved_px(s, curved_e);
         d.limb_px = bst_body_limb_px(s, d.light_e);
+        /* without that of shadows if they stay as they are, and with what would be left of it */
+        bool same = sun_rule == d.sun_rule;
+        double sigma = b->sigma - (same ? bst_body_shadow_sigma(&d, b, sun_rule) : 0.0);
+        double least = bst_body_least_error(&d, b, curved_e) +
+                       (same ? 0.0 : bst_body_shadow_sigma(&d, b, sun_rule));
         d.sun_rule = sun_rule;
-        if (b->sigma <= limit * s->options.tolerance_sigma ||
-            (round > 0 && b->sigma > WORTH * before) ||
-            bst_body_least_error(&d, b, curved_e) > WORTH * b->sigma) {
+        if (sigma <= limit * s->options.tolerance_sigma || (round > 0 && sigma > WORTH * before) ||
+            least > WORTH * sigma) {
             break;
         }
+        before = sigma;
     }
     return BST_OK;
 }

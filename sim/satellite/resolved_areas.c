@@ -328,7 +328,7 @@ void bst_resolved_join_light(bst_resolved *to, bst_resolved *from) {
     to->image.surface_light = fmax(to->image.surface_light, from->image.surface_light);
     for (int i = 0; i < BST_RESOLVED_PENUMBRAE; i++) {
         bst_resolved_penumbra *p = &to->image.penumbrae[i];
-        p->light = fmax(p->light, from->image.penumbrae[i].light);
+        p->light_px2 = fmax(p->light_px2, from->image.penumbrae[i].light_px2);
         p->px = fmax(p->px, from->image.penumbrae[i].px);
     }
     for (int i = 0; i < 2; i++) {

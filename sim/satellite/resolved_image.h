@@ -45,8 +45,9 @@ typedef struct bst_resolved_second {
 
 /* Borders of shadows of which the penumbrae are as wide, but for a factor of two. */
 typedef struct bst_resolved_penumbra {
-    double light; /* most sunlight of a surface beside them, per px^2, without the weight */
-    double px;    /* most half width across them, px */
+    double px;        /* half width across the widest, px */
+    double light_px2; /* most of the sunlight beside one, per px^2 and without the weight, times the
+                         square of its half width */
 } bst_resolved_penumbra;
 
 /* Widths, powers of two: half widths from 2^-8 px. */

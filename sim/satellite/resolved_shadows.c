@@ -37,7 +37,7 @@ void bst_resolved_note_shadow(const bst_resolved_adding *a, bst_vec3 normal, bst
     double px = a->light->sun_radius_rad * gap_m * largest * a->per_m * m->cell_px / range_m;
     int octave = (int)fmin(fmax(floor(log2(px)) + 8.0, 0.0), BST_RESOLVED_PENUMBRAE - 1.0);
     bst_resolved_penumbra *p = &m->penumbrae[octave];
-    p->light = fmax(p->light, light / (m->cell_px * m->cell_px));
+    p->light_px2 = fmax(p->light_px2, light / (m->cell_px * m->cell_px) * px * px);
     p->px = fmax(p->px, px);
 }
 

@@ -59,8 +59,7 @@ static void test_quadratures(void **state) {
             for (double at = -width - 3.0; at < width + 3.0; at += 0.4) {
                 double image = 0.0;
                 for (int k = 0; k < t.count; k++) {
-                    double across =
-                        t.shadow_at[k][0] * cos(angle) + t.shadow_at[k][1] * sin(angle);
+                    double across = t.shadow_at[k][0] * cos(angle) + t.shadow_at[k][1] * sin(angle);
                     image += t.weight[k] * edge(at - width * across);
                 }
                 worst = fmax(worst, fabs(image - penumbra(at, width)));
@@ -93,10 +92,10 @@ enum { SIDE = 128 };
 #define HEIGHT_M 3.0
 #define EDGE_M -1.8
 #define PER_PX_E 1e4
-#define PLATES \
-    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 1}], \"parts\": [{\"name\": \"low\", " \
+#define PLATES                                                                                \
+    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 1}], \"parts\": [{\"name\": \"low\", "   \
     "\"kind\": \"plate\", \"size_m\": [5, 5, 0], \"material\": \"m\"}, {\"name\": \"high\", " \
-    "\"kind\": \"plate\", \"size_m\": [6, 12, 0], \"position_m\": [-4.8, 0, 3], " \
+    "\"kind\": \"plate\", \"size_m\": [6, 12, 0], \"position_m\": [-4.8, 0, 3], "             \
     "\"material\": \"m\"}"
 
 /* The shadow of the edge at EDGE_M is cast by HEIGHT_M times the tangent of the incidence, and a
@@ -109,28 +108,29 @@ static void test_plate_over_plate(void **state) {
     camera.pixel_scale_arcsec = 1.0 / (RANGE_M * PX_PER_M) / BST_ARCSEC_RAD;
     double sigma_px = bst_camera_psf_sigma_px(&camera), s = sigma_px * sqrt(2.0);
     static const char *const texts[] = {
-        PLATES "]}", PLATES ", {\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 0.05, "
-                            "\"position_m\": [2, 2.3, 0.1], \"material\": \"m\"}]}"};
-    const double au[] = {3.0, 1.0, 0.3, 0.12}, in = atan(0.75);
+        PLATES "]}", PLATES
+        ", {\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 0.05, "
+        "\"position_m\": [2, 2.3, 0.1], \"material\": \"m\"}]}"};
+    const double au[] = {3.0, 1.0, 0.3, 0.12, 1.0}, in = atan(0.75);
     const scene_motion still = {.duration_s = 1.0, .samples = 2};
     scene_track track = scene_track_make(&camera, &still);
-    for (int n = 0; n < 8; n++) {
+    for (int n = 0; n < 5; n++) {
         bst_test_model model = bst_test_model_open(texts[n / 4]);
-        double a = bst_camera_scale_rad(&camera), radius = BST_SUN_RADIUS_M / (au[n % 4] * BST_AU_M);
+        double a = bst_camera_scale_rad(&camera), radius = BST_SUN_RADIUS_M / (au[n] * BST_AU_M);
         bst_scene_source_body body = {.satellite = model.satellite, .times = 1};
         body.q_body_from_gcrf[0] = bst_quat_from_rotvec((bst_vec3){-BST_PI, 0.0, 0.0});
         body.object_m[0] = body.object_m[1] = (bst_vec3){7e6, 0, 0};
-        body.sun_m = bst_vec3_axpy(body.object_m[0], au[n % 4] * BST_AU_M,
-                                   (bst_vec3){-sin(in), 0.0, -cos(in)});
+        body.sun_m =
+            bst_vec3_axpy(body.object_m[0], au[n] * BST_AU_M, (bst_vec3){-sin(in), 0.0, -cos(in)});
         body.gain[0].sun = BST_PI * PER_PX_E / (a * a);
         const double place[2] = {63.2, 64.45};
-        bst_scene_source source = {.kind = BST_SOURCE_OBJECT,
-                                   .apparent_mid =
-                                       bst_camera_unproject(&camera, place[0], place[1]),
-                                   .range_m = RANGE_M,
-                                   .body = &body,
-                                   .body_u = {0.0, 1.0},
-                                   .electrons_per_s = 2e7};
+        bst_scene_source source = {
+            .kind = BST_SOURCE_OBJECT,
+            .apparent_mid = bst_camera_unproject(&camera, place[0], place[1]),
+            .range_m = RANGE_M,
+            .body = &body,
+            .body_u = {0.0, 1.0},
+            .electrons_per_s = 2e7};
         bst_renderer *r;
         bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, NULL, &r));
         bst_render_request q = {
@@ -158,7 +158,7 @@ static void test_plate_over_plate(void **state) {
             }
             sharp = fmax(sharp, fabs(without - expected) / noise);
         }
-        printf("%g au: %.4f sigma, predicted %.4f; without penumbra %.3f\n", au[n % 4], worst,
+        printf("%g au: %.4f sigma, predicted %.4f; without penumbra %.3f\n", au[n], worst,
                stats.predicted_sigma, sharp);
         assert_true(worst <= 0.05); /* the limit of the issue for images */
         assert_true(worst <= stats.predicted_sigma);
