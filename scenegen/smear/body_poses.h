@@ -10,6 +10,9 @@ enum { BST_BODY_POSES_MAX = 1024 };
 /* Poses of an exposure. */
 typedef struct bst_body_times {
     double u[BST_BODY_POSES_MAX], weight[BST_BODY_POSES_MAX]; /* fractions of the exposure */
+    /* points of the Sun's disc that cast the shadows (bst_resolved_light); poses with the same time
+     * follow each other */
+    double shadow_at[BST_BODY_POSES_MAX][2];
     int count;
     double error; /* of the quadrature: of the light at a border, over that of the body */
     double light; /* where it is: light at least, over that of the body */

@@ -34,6 +34,12 @@
 /* Share of the tolerance for a facet that turns into the light: a larger error asks for poses
  * beside it. */
 #define KINK_SHARE 0.03
+/* Share for penumbrae at least, over that of the poses, which gives it up if the image takes more
+ * than the centre of the Sun. */
+#define PENUMBRA_SHARE 0.5
+/* Quadratures of the Sun's disc for models with curved surfaces, of which a pose takes some 0.3 s:
+ * up to 32 points. */
+#define CURVED_SUN_RULES 5
 /* Light of the brightest facet over the mean that is expected, at most. */
 #define BRIGHTER 4.0
 /* Least error of borders of curved surfaces and between their parts that is asked for, px. */
@@ -104,6 +110,12 @@ bool bst_body_even(const bst_body_image_plan *p) {
     return p->light_e < EVEN_SIGMAS * sqrt(p->light_e + p->s->dark_variance_e2);
 }
 
+static double poses_share(const bst_body_image_plan *p, bool blurred) {
+    return p->source->body->satellite->curved_count > 0 ? CURVED_POSES_SHARE
+           : blurred                                    ? BLURRED_POSES_SHARE
+                                                        : POSES_SHARE;
+}
+
 void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, bool *blurred) {
     const bst_smear *s = p->s;
     double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
@@ -121,8 +133,7 @@ void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, boo
             missed_e * bst_body_kinks_find(p->source, p->turn_rad, least_rad, pose, &p->glints);
     }
     *blurred = blur >= BLURRED_SIGMAS;
-    double share = *blurred ? BLURRED_POSES_SHARE : POSES_SHARE;
-    share = p->source->body->satellite->curved_count > 0 ? CURVED_POSES_SHARE : share;
+    double share = poses_share(p, *blurred) * (p->sun_rule > 0 ? 1.0 - PENUMBRA_SHARE : 1.0);
     const bst_body_times_aim aim = {.sigmas = sigmas,
                                     .pose_e = fmax(p->pose_e, p->light_e),
                                     .light_e = p->light_e,
@@ -131,6 +142,34 @@ void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, boo
                                     .glints = p->glints.items,
                                     .glint_count = p->glints.count};
     bst_body_times_choose(&aim, &p->times);
+}
+
+double bst_body_shadow_sigma(const bst_body_image_plan *d, const bst_smear_body *b, int rule) {
+    double weights = 0.0, sigma_px = sqrt(d->s->sigma_px * d->s->sigma_px + 1.0 / 12.0);
+    for (int k = 0; k < d->times.count; k++) {
+        weights += d->times.weight[k];
+    }
+    double electrons = d->source->electrons_per_s * d->s->duration_s * weights;
+    double swept = b->blurred ? (d->moved_px + FASTER * d->turned_px) / sigma_px : 0.0;
+    return bst_body_penumbra_sigma(bst_resolved_image_of(b->image), rule, electrons, sigma_px,
+                                   swept, d->s->dark_variance_e2);
+}
+
+int bst_body_choose_sun(const bst_body_image_plan *d, const bst_smear_body *b,
+                        double allowed_sigma) {
+    int rule = d->sun_rule;
+    double sigma = bst_body_shadow_sigma(d, b, rule);
+    double least = PENUMBRA_SHARE * poses_share(d, b->blurred) * d->s->options.tolerance_sigma;
+    double left = fmax(allowed_sigma - (b->sigma - sigma), least);
+    if (b->blurred) {
+        return rule; /* as many poses again for each point: too slow for what is left */
+    }
+    int rules =
+        d->source->body->satellite->curved_count > 0 ? CURVED_SUN_RULES : BST_BODY_SUN_RULES;
+    while (sigma > left && rule + 1 < rules) {
+        sigma = bst_body_shadow_sigma(d, b, ++rule);
+    }
+    return rule;
 }
 
 /* Most light in a pixel of the image, electrons before the PSF. */
@@ -205,6 +244,7 @@ void bst_body_set_error(bst_body_image_plan *d, bst_smear_body *b, double *light
     }
     b->sigma = error * *light_e / border_noise_e(s, *light_e) + curved_sigma(d, m, *curved_e) +
                bst_body_times_sigma(&d->times, d->pose_e, *light_e, s->dark_variance_e2);
+    b->sigma += bst_body_shadow_sigma(d, b, d->sun_rule);
     b->sigma += STAMP_SHARE * s->options.tolerance_sigma;
     if (d->glint_count > 0) {
         b->sigma += GLINT_ERROR * *light_e / sqrt(*light_e + s->dark_variance_e2);

@@ -3,6 +3,7 @@
 #define BST_SCENEGEN_SMEAR_BODY_PRECISION_H
 
 #include "scenegen/smear/body_glints.h"
+#include "scenegen/smear/body_penumbra.h"
 #include "scenegen/smear/smear_internal.h"
 
 /* What the poses of an image have in common. */
@@ -17,6 +18,7 @@ typedef struct bst_body_image_plan {
     double kinks_e;            /* error by kinks without room, electrons */
     double light_e;            /* in a pixel, for which the image is drawn */
     double pose_e;             /* the same of a pose without motion; 0: not known yet */
+    int sun_rule;              /* points of the Sun's disc: see body_penumbra.h */
     double curved_px, limb_px; /* see bst_resolved_view */
 } bst_body_image_plan;
 
@@ -38,6 +40,17 @@ double bst_body_cell_px(const bst_body_image_plan *plan, double area_px2, bool l
  *
  * Returned:  *blurred  borders fall on all parts of the cells */
 void bst_body_choose_poses(bst_body_image_plan *plan, bst_satellite_pose *pose, bool *blurred);
+
+/* Error by shadows from some points of the Sun's disc, sigma of a pixel. */
+double bst_body_shadow_sigma(const bst_body_image_plan *plan, const bst_smear_body *body, int rule);
+
+/* The points of the Sun's disc for an image that is drawn again.
+ *
+ * Given:     body           as bst_body_set_error left it
+ *            allowed_sigma  for the whole image but its nodes
+ * Returned:  the quadrature in use, if its error stays within that, or is a small part of it */
+int bst_body_choose_sun(const bst_body_image_plan *plan, const bst_smear_body *body,
+                        double allowed_sigma);
 
 /* True if edges between facets of almost the same light may go without second moments. */
 bool bst_body_even(const bst_body_image_plan *plan);

@@ -321,6 +321,8 @@ static bst_status draw(bst_ctx *ctx, const bst_body_image_plan *d, int k, bool l
     bst_resolved_view view;
     double weight = d->times.weight[k];
     pose_at(d->s, d->source, d->times.u[k], pose, &view, &light, &earthlight);
+    light.shadow_at[0] = d->times.shadow_at[k][0];
+    light.shadow_at[1] = d->times.shadow_at[k][1];
     view.curved_px = d->curved_px;
     view.limb_px = fmin(d->limb_px, d->curved_px);
     bst_resolved_hidden hidden;
@@ -348,9 +350,11 @@ static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_
     if (b->one_pose && d->source->rate) { /* the path has the rate */
         inverse /= bst_scene_source_rate_at(d->source, 0.5);
     }
+    double factor = 1.0;
     for (int k = 0; k < d->times.count; k++) {
-        double factor;
-        BST_TRY(find_factor(ctx, s, b, d->source, d->times.u[k], &factor));
+        if (k == 0 || d->times.u[k] != d->times.u[k - 1]) {
+            BST_TRY(find_factor(ctx, s, b, d->source, d->times.u[k], &factor));
+        }
         d->times.weight[k] *= factor * inverse;
     }
     if (light_only) {
@@ -391,6 +395,10 @@ static bst_status draw_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_
     if (!b->one_pose) {
         bst_body_choose_poses(d, b->pose, &b->blurred);
     }
+    if (d->sun_rule > 0) {
+        d->sun_rule = bst_body_penumbra_expand(&d->times, d->sun_rule);
+    }
+    b->penumbrae = d->sun_rule > 0;
     *there = find_box(s, b, d->source, &d->times, low, high);
     if (!*there) {
         return BST_OK;
@@ -403,7 +411,7 @@ static bst_status draw_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, bst_
 
 /* Error of all nodes, over their share of the tolerance. */
 static double neighbours_of(const bst_smear_body *b) {
-    return b->one_pose || b->blurred ? NEIGHBOURS : NEIGHBOURS_IN_POSES;
+    return (b->one_pose && !b->penumbrae) || b->blurred ? NEIGHBOURS : NEIGHBOURS_IN_POSES;
 }
 
 /* Makes the image of a source for the frame: again, finer, if its light turns out to be so bright
@@ -427,23 +435,30 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
         bst_body_glints_find(source, &b->glints, d.turn_rad, b->pose, &d.glints);
         d.glint_count = d.glints.count;
     }
-    b->sigma = 0.0;
+    double before = 0.0;
     for (int round = 0; round < ROUNDS; round++) {
-        double light_e, curved_e, before = b->sigma;
+        double light_e, curved_e;
         BST_TRY(draw_image(ctx, s, b, &d, there));
         if (!*there || b->empty) {
             return BST_OK;
         }
         bst_body_set_error(&d, b, &light_e, &curved_e);
         double limit = 1.0 - IMAGE_SHARE * neighbours_of(b);
+        int sun_rule = bst_body_choose_sun(&d, b, limit * s->options.tolerance_sigma);
         d.light_e = fmax(light_e, 1.1 * d.light_e);
         d.curved_px = bst_body_curved_px(s, curved_e);
         d.limb_px = bst_body_limb_px(s, d.light_e);
-        if (b->sigma <= limit * s->options.tolerance_sigma ||
-            (round > 0 && b->sigma > WORTH * before) ||
-            bst_body_least_error(&d, b, curved_e) > WORTH * b->sigma) {
+        /* without that of shadows if they stay as they are, and with what would be left of it */
+        bool same = sun_rule == d.sun_rule;
+        double sigma = b->sigma - (same ? bst_body_shadow_sigma(&d, b, sun_rule) : 0.0);
+        double least = bst_body_least_error(&d, b, curved_e) +
+                       (same ? 0.0 : bst_body_shadow_sigma(&d, b, sun_rule));
+        d.sun_rule = sun_rule;
+        if (sigma <= limit * s->options.tolerance_sigma || (round > 0 && sigma > WORTH * before) ||
+            least > WORTH * sigma) {
             break;
         }
+        before = sigma;
     }
     return BST_OK;
 }

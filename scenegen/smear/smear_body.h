@@ -17,10 +17,11 @@ typedef struct bst_smear_body {
     bst_body_poses others;       /* for images of many poses */
     int64_t frame;               /* for which the image is made; 0: none */
     double cell_px;
-    double x0, y0; /* origin of the image's positions, px from the boresight */
-    bool blurred;  /* borders fall on all parts of the cells */
-    bool one_pose; /* the image of mid-exposure, to be moved along the path */
-    double sigma;  /* error of the image but for its nodes, sigma of a pixel */
+    double x0, y0;  /* origin of the image's positions, px from the boresight */
+    bool blurred;   /* borders fall on all parts of the cells */
+    bool penumbrae; /* shadows from several points of the Sun's disc */
+    bool one_pose;  /* the image of mid-exposure, to be moved along the path */
+    double sigma;   /* error of the image but for its nodes, sigma of a pixel */
     bst_body_glint_list glints;
     bool empty; /* no image */
 } bst_smear_body;

@@ -200,7 +200,8 @@ static inline void add_edge_within(bst_area_sums *s, bst_point2 a, bst_point2 b,
             i = (int)x;
             double side = along > 0 ? i + 1.0 : i;
             side = along > 0 ? (side < x_next ? side : x_next) : (side > x_next ? side : x_next);
-            double y_side = wide != 0.0 ? y + (side - x) * steep : y_next;
+            /* not by the slope in the same cell: of edges along y it is rounding */
+            double y_side = side != x_next ? y + (side - x) * steep : y_next;
             y_side = y_side < y_next ? y_side : y_next;
             pair cx = {i + 0.5, i + along + 0.5};
             double cy = j + 0.5;

@@ -294,3 +294,31 @@ bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
     }
     return whole;
 }
+
+double bst_facet_layers_gap(const bst_facet_layers *l, int facet) {
+    enum { BORDERS = 256 };
+    bst_layers_outline own;
+    int borders[BORDERS];
+    double plane[3], gap = 0.0;
+    if (!bst_facet_layers_plane(l, facet, plane)) {
+        return 0.0;
+    }
+    make_outline(l, facet, &own);
+    int count = bst_facet_borders_before(l, &l->boxes[facet], &own, plane, borders, BORDERS);
+    if (count < 0) {
+        return UINT16_MAX / l->level_per;
+    }
+    for (int n = 0; n < count; n++) {
+        const bst_layers_border *b = &l->borders[borders[n]];
+        double t[2];
+        if (bst_facet_borders_part(own.p, own.count, b->a, b->b, t) != BST_LAYERS_PLACE_CROSSING) {
+            continue;
+        }
+        for (int i = 0; i < 2; i++) {
+            double x = b->a.x + t[i] * (b->b.x - b->a.x), y = b->a.y + t[i] * (b->b.y - b->a.y);
+            double near = b->near[0] + t[i] * (b->near[1] - b->near[0]);
+            gap = fmax(gap, near - plane[0] - plane[1] * x - plane[2] * y);
+        }
+    }
+    return gap;
+}

@@ -102,6 +102,10 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *layers,
  *            counter-clockwise */
 bool bst_facet_layers_cut(bst_facet_layers *layers, int facet);
 
+/* How much nearer than a facet the borders are that cross it, at most: where their shadows end.
+ * More than there is room for count as the extent of the model. */
+double bst_facet_layers_gap(const bst_facet_layers *layers, int facet);
+
 /* Plane of a facet in the view: near = out[0] + out[1] x + out[2] y. False: it has no area. */
 bool bst_facet_layers_plane(const bst_facet_layers *layers, int facet, double out[3]);
 

@@ -280,6 +280,11 @@ static double add_facet(const bst_resolved_adding *a, int facet, const light_vie
         if (!s->lit[n].doubtful[facet] || bst_facet_layers_cut(&s->lit[n], facet)) {
             even += light;
         } else {
+            if (n == 0 && !bst_polygon_clip_is_empty(&s->lit[0].clip)) {
+                double gap_m = bst_facet_layers_gap(&s->lit[0], facet);
+                bst_resolved_note_shadow(a, s->planes[facet].normal, s->middles[facet], light,
+                                         gap_m);
+            }
             add_lit(a, facet, n, &views[n], whole, weight * light);
         }
     }
@@ -342,6 +347,11 @@ void bst_resolved_join_light(bst_resolved *to, bst_resolved *from) {
     add_kept(&from->areas);
     bst_area_sums_add(&to->areas.sums, &from->areas.sums);
     to->image.surface_light = fmax(to->image.surface_light, from->image.surface_light);
+    for (int i = 0; i < BST_RESOLVED_PENUMBRAE; i++) {
+        bst_resolved_penumbra *p = &to->image.penumbrae[i];
+        p->light_px2 = fmax(p->light_px2, from->image.penumbrae[i].light_px2);
+        p->px = fmax(p->px, from->image.penumbrae[i].px);
+    }
     for (int i = 0; i < 2; i++) {
         to->image.reached_px[i] = fmax(to->image.reached_px[i], from->image.reached_px[i]);
     }
@@ -361,7 +371,7 @@ bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, do
     BST_TRY(face_eye(ctx, a));
     shade(a);
     BST_TRY(bst_facet_layers_find(ctx, &s->eye, s->wanted));
-    views[0] = light_view_of(a, a->light->sun);
+    views[0] = light_view_of(a, bst_resolved_shadow_sun(a->light));
     BST_TRY(look_from_light(ctx, a, 0, &views[0]));
     if (a->earth) {
         views[1] = light_view_of(a, a->light->earthlight->centre);

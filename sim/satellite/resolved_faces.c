@@ -86,6 +86,9 @@ static void swap_views(bst_satellite_pose *p) {
 double bst_resolved_lit_fraction(const bst_resolved_adding *a, int facet, int view) {
     bool whole;
     double area_m2 = a->r->satellite->facets[facet].area_m2;
+    if (view == 0 && !(bst_vec3_dot(a->pose->normals[facet], a->pose->views[0].z) > 1e-9)) {
+        return 1.0; /* the Sun's centre lights it at grazing incidence, that point does not */
+    }
     if (view == 1) {
         swap_views(a->pose);
     }
@@ -396,6 +399,9 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
         /* light from below the horizon of the facet that is not from the centroid: no shadow */
         if (lit > 0.0 && (view == 0 || bst_vec3_dot(normal, a->light->earthlight->centre) > 0.05)) {
             lit = bst_resolved_lit_fraction(a, facet, view);
+        }
+        if (view == 0 && lit > 0.0 && lit < 1.0) {
+            bst_resolved_note_shadows_on(a, facet, s.sun);
         }
         if (lit >= 1.0) {
             s.uniform += light[view];

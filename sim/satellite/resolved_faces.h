@@ -123,6 +123,22 @@ bst_resolved_shading bst_resolved_shade(const bst_resolved_adding *a, int materi
 void bst_resolved_note_light(const bst_resolved_adding *a, const bst_resolved_shading *light,
                              bool round);
 
+/* Direction of the point of the Sun's disc that casts the shadows. */
+bst_vec3 bst_resolved_shadow_sun(const bst_resolved_light *light);
+
+/* Keeps the width of the penumbrae on a facet for bst_resolved_image.
+ *
+ * Given:     normal  unit, body frame
+ *            place   on the facet, body frame
+ *            light   sunlight per cell
+ *            gap_m   along the light, from the facet to what casts the shadow */
+void bst_resolved_note_shadow(const bst_resolved_adding *a, bst_vec3 normal, bst_vec3 place,
+                              double light, double gap_m);
+
+/* The same for a plane or curved facet of which the Sun reaches a part, by the outlines of the
+ * bodies that may shadow it. */
+void bst_resolved_note_shadows_on(const bst_resolved_adding *a, int facet, double light);
+
 /* Fraction of a facet that a light reaches; the pieces are in pose->clip if it is between 0 and 1.
  *
  * Given:     view  0: Sun; 1: earthlight */

@@ -105,6 +105,7 @@ bst_status bst_resolved_begin_box(bst_ctx *ctx, bst_resolved *r, const double lo
         }
     }
     m->second = NULL;
+    memset(m->penumbrae, 0, sizeof m->penumbrae);
     m->surface_light = m->curved_light = m->reached_px[0] = m->reached_px[1] = 0.0;
     return BST_OK;
 }
@@ -144,7 +145,7 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *p
     const bst_satellite *sat = r->satellite;
     bst_resolved_adding a = start(r, pose, view, light);
     if (light) {
-        bst_pose_look(pose, 0, light->sun);
+        bst_pose_look(pose, 0, bst_resolved_shadow_sun(light));
         if (a.earth) {
             bst_pose_look(pose, 1, light->earthlight->centre);
         }

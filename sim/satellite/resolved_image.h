@@ -37,6 +37,8 @@ typedef struct bst_resolved_gain {
 typedef struct bst_resolved_light {
     bst_vec3 sun;                     /* unit */
     double sun_radius_rad;            /* angular radius of the Sun's disc; 0: a point */
+    double shadow_at[2];              /* point of the disc that casts the shadows, from its centre:
+                                         right and up in any axes, in radii of the disc */
     const bst_earthlight *earthlight; /* NULL: none */
     const bst_resolved_gain *gain;    /* [material_count] */
 } bst_resolved_light;
@@ -52,6 +54,16 @@ typedef struct bst_resolved_second {
     float xx, xy, yy;
 } bst_resolved_second;
 
+/* Borders of shadows of which the penumbrae are as wide, but for a factor of two. */
+typedef struct bst_resolved_penumbra {
+    double px;        /* half width across the widest, px */
+    double light_px2; /* most of the sunlight beside one, per px^2 and without the weight, times the
+                         square of its half width */
+} bst_resolved_penumbra;
+
+/* Widths, powers of two: half widths from 2^-8 px. */
+enum { BST_RESOLVED_PENUMBRAE = 16 };
+
 /* A grid of cells. Cell (i, j) has its centre at ((x0 + i + 0.5) cell_px, (y0 + j + 0.5) cell_px)
  * from the boresight. */
 typedef struct bst_resolved_image {
@@ -62,6 +74,7 @@ typedef struct bst_resolved_image {
     /* most light of a surface in any pose, and of one that is curved or has a round border, per
      * px^2, without the weight */
     double surface_light, curved_light;
+    bst_resolved_penumbra penumbrae[BST_RESOLVED_PENUMBRAE]; /* that the Sun's disc would make */
     /* error of parts of curved surfaces ([0]) and of their borders ([1]) where more parts were
      * asked for than are made, px; 0: none */
     double reached_px[2];
@@ -120,8 +133,9 @@ bst_status bst_resolved_begin_box(bst_ctx *ctx, bst_resolved *resolved, const do
  * Notes:     sides of facets and borders of shadows are exact: the light of a cell is that of the
  *            areas of its visible, lit polygons: facets, also of parts that intersect, are cut
  * where others are nearer. Curved surfaces consist of facets of a fraction of a pixel, and their
- * shadows at grazing incidence are those on the middles of these. The Sun casts shadows from the
- * centre of its disc. Light that is reflected twice is left out. */
+ * shadows at grazing incidence are those on the middles of these. The Sun casts shadows from one
+ * point of its disc: the mean of poses that differ in shadow_at has penumbrae. Light that is
+ * reflected twice is left out. */
 bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_pose *pose,
                             const bst_resolved_view *view, const bst_resolved_light *light,
                             double weight, double *total) BST_MUST_CHECK;
