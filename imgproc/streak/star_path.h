@@ -92,8 +92,8 @@ enum { BST_STAR_PATH_VOTERS = 64 };
  * streak. The path is continued along a parabola through it, and a little to both sides.
  *
  * Returned:  votes  for each end the greatest logarithm of the likelihood of one more than 8 px
- *                   away, up to half the path, over that of this one; -HUGE_VAL: none is far
- * enough, as of a path of fewer than ten samples */
+ *                   away, up to half the path, over that of this one; -HUGE_VAL: none is far enough, as of
+ *                   a path of fewer than ten samples */
 void bst_star_path_vote(const bst_star_path *path, const bst_star_path_image *image,
                         const bst_star_path_star *stars, int count, double votes[2]);
 
