@@ -36,8 +36,10 @@ static double point_lead(const bst_generator *g, const bst_star_trail_path *path
                          bst_path_fit_squares streak, double plain, double at_px[2], double *flux) {
     const bst_streak_model model = bst_generator_streak_model(g),
                            point = {.sigma_px = g->total_sigma};
+    /* on its own pixels: an object's may be beyond those of a streak at its mean place */
+    double start_px[2] = {at_px[0], at_px[1]};
+    *flux = fmin(fmax(bst_path_fit(path, &point, NULL, light, start_px).flux, 0.0), 1.0);
     bst_path_fit_squares fit = bst_path_fit(path, &point, &model, light, at_px);
-    *flux = fmin(fmax(fit.flux, 0.0), 1.0);
     double own = sqrt(fmax(1.0 - fit.left / streak.all, 0.0));
     double other = sqrt(fmax(1.0 - streak.left / streak.all, 0.0));
     return sqrt(streak.all / plain) * (own - other);

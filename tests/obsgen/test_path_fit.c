@@ -480,6 +480,36 @@ static void a_point_has_the_light_at_rest(void **state) {
     close_scene(&s);
 }
 
+/* A point's fit to an object that moves far on top of the stars' uneven path, where its image is
+ * beyond the pixels of a streak of the stars at its mean place, has the light of the path under the
+ * point. */
+static void a_point_far_along_its_path_has_the_light_there(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    path p = resting(22.0, 0.46);
+    bst_generator_result r = run_on(&s, &p, 60.0, 0);
+    bst_generator *g = s.generator;
+    assert_true(r.count > 850 && g->uneven);
+    const double more = 150.0; /* in the time at rest this is the whole speed of the object */
+    generator_source o = g->sources[0];
+    o.star = false;
+    o.path.dx = g->straight_path.dx + more;
+    o.path.dy = g->straight_path.dy;
+    o.length = hypot(o.path.dx, o.path.dy);
+    /* a uniform line under a Gaussian: 2 sqrt(pi) sigma of it, up to 1.7 times with a free width */
+    double line = 2.0 * sqrt(BST_PI) * g->total_sigma / more;
+    for (int k = 0; k < 3; k++, o.flux_e *= 30.0) {
+        (void)bst_generator_set_filter(g, &o);
+        printf("point at %.1f px, %.3f of %.0f e, %.3f with a fixed width\n", o.start_x,
+               o.point_flux, o.flux_e, line);
+        assert_true(hypot(o.start_x, o.start_y) > 0.5 * g->streak + 4.0 * g->total_sigma);
+        assert_true(o.point_flux > 0.9 * line && o.point_flux < 2.0 * line);
+    }
+    close_scene(&s);
+}
+
 /* Noise decides the shape of a faint star whose streak has a lower output than its point: one that
  * the streak's filter alone shows is a streak, and is no point below the threshold. */
 static void faint_stars_may_be_streaks(void **state) {
@@ -518,6 +548,7 @@ int main(void) {
         cmocka_unit_test(bright_streaks_have_another_bias),
         cmocka_unit_test(stars_that_rest_are_points_where_they_rest),
         cmocka_unit_test(a_point_has_the_light_at_rest),
+        cmocka_unit_test(a_point_far_along_its_path_has_the_light_there),
         cmocka_unit_test(faint_stars_may_be_streaks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
