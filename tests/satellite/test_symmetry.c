@@ -211,8 +211,14 @@ static void images(void **state) {
         w.q_image_from_body = bst_quat_mul(roll, bst_quat_mul(q, bst_quat_conj(both.turn)));
         w.origin_m = bst_vec3_sub(bst_quat_rotate(roll, v.origin_m),
                                   bst_quat_rotate(w.q_image_from_body, SHIFT_M));
-        bst_resolved_light in = {s.sun, k % 2 ? 0.00465 : 0.0, &e[0], gain};
-        bst_resolved_light also = {turned(s.sun), in.sun_radius_rad, &e[1], gain};
+        bst_resolved_light in = {.sun = s.sun,
+                                 .sun_radius_rad = k % 2 ? 0.00465 : 0.0,
+                                 .earthlight = &e[0],
+                                 .gain = gain};
+        bst_resolved_light also = {.sun = turned(s.sun),
+                                   .sun_radius_rad = in.sun_radius_rad,
+                                   .earthlight = &e[1],
+                                   .gain = gain};
         const bst_resolved_image *x = draw(ra, &both.a, &v, &in, 40.0);
         const bst_resolved_image *y = draw(rb, &both.b, &w, &also, 40.0);
         assert_int_equal(y->width, x->width);
