@@ -161,8 +161,7 @@ typedef struct fitted {
     double x, y, flux, widening;
 } fitted;
 
-/* One Gauss-Newton step; *squares are those before it. False if the place is settled and the flux's
- * step is whole. */
+/* One Gauss-Newton step; *squares are those before it. False if the place is settled. */
 static bool improve(const planes *seen, const planes *model, int n, double light, double variance,
                     fitted *f, bst_path_fit_squares *squares) {
     double a[PARAMETERS][PARAMETERS] = {{0.0}}, g[PARAMETERS] = {0.0}, top = 0.0;
@@ -194,11 +193,10 @@ static bool improve(const planes *seen, const planes *model, int n, double light
     f->x += fmin(fmax(g[0], -MOST_STEP_PX), MOST_STEP_PX);
     f->y += fmin(fmax(g[1], -MOST_STEP_PX), MOST_STEP_PX);
     /* as in imgproc/measure/fit.c */
-    bool cut = f->flux + g[2] < 0.1 * f->flux;
-    f->flux = cut ? 0.1 * f->flux : f->flux + g[2];
+    f->flux = fmax(f->flux + g[2], 0.1 * f->flux);
     f->widening =
         fmin(fmax(f->widening + g[3], LEAST_WIDENING * variance), MOST_WIDENING * variance);
-    return cut || fabs(g[0]) > SETTLED_PX || fabs(g[1]) > SETTLED_PX;
+    return fabs(g[0]) > SETTLED_PX || fabs(g[1]) > SETTLED_PX;
 }
 
 bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
@@ -208,19 +206,14 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
     planes seen, shape;
     sample_path(path, &star);
     sample_model(model, &streak);
-    const bst_streak_model *across = stamp ? stamp : model;
-    sample_model(across, &about);
-    for (int i = 0; !stamp && i < about.count; i++) {
-        about.x[i] += place_px[0];
-        about.y[i] += place_px[1];
-    }
-    double length = hypot(across->path.dx, across->path.dy);
-    double c = length > 0.0 ? across->path.dx / length : 1.0;
-    double s = length > 0.0 ? across->path.dy / length : 0.0;
+    sample_model(stamp, &about);
+    double length = hypot(stamp->path.dx, stamp->path.dy);
+    double c = length > 0.0 ? stamp->path.dx / length : 1.0;
+    double s = length > 0.0 ? stamp->path.dy / length : 0.0;
     turn(&star, c, s);
     turn(&streak, c, s);
     turn(&about, c, s);
-    grid g = grid_about(&about, across->sigma_px, MARGIN_SIGMAS * across->sigma_px);
+    grid g = grid_about(&about, stamp->sigma_px, MARGIN_SIGMAS * stamp->sigma_px);
     double sigma = model->sigma_px, image = sqrt(sigma * sigma + star.spread);
     int n = g.columns * g.rows;
     for (int i = 0; i < star.count; i++) { /* render() gives each Gaussian the peak of its weight */

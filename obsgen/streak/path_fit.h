@@ -28,8 +28,8 @@ typedef struct bst_path_fit_squares {
  * in the mean over noise. Free parameters are those of image processing: place, flux and width.
  * Each pixel has the weight 1 / (noise^2 + fitted light).
  *
- * Given:     stamp     streak about the path's mean whose surroundings are fitted: `model` itself
- *                      unless shapes are compared; NULL: those of `model` at the start
+ * Given:     stamp     streak whose surroundings are fitted; `model` itself unless shapes are
+ *                      compared
  *            light     brightest pixel of the fitted light over the variance of the noise
  *            place_px  start of the iterations: (0, 0) or the place for another light
  * Returned:  place_px: relative to the mean of the path, px; the fit's sums of squares */

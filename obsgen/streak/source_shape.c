@@ -25,6 +25,18 @@ bool bst_generator_is_uniform(const bst_generator *g) {
     return !(g->path_rms_px > UNIFORM_PX);
 }
 
+/* Light that a point of the PSF at a place finds by least squares on white noise, of the whole. */
+static double light_under_point(const bst_star_trail_path *path, double sigma_px,
+                                const double at_px[2]) {
+    double sum = 0.0;
+    for (int k = 0; k < path->count; k++) {
+        double dx = path->x_px[k] - at_px[0], dy = path->y_px[k] - at_px[1];
+        double share = k == 0 || k == path->count - 1 ? 0.5 : 1.0;
+        sum += share * exp(-0.25 * (dx * dx + dy * dy) / (sigma_px * sigma_px));
+    }
+    return sum / (path->count - 1);
+}
+
 /* Lead of a point's fit over a streak's: difference of the outputs of their filters, for a source
  * of SNR 1 without its own noise. A fit lowers chi-square by the square of its filter's output.
  *
@@ -36,11 +48,11 @@ static double point_lead(const bst_generator *g, const bst_star_trail_path *path
                          bst_path_fit_squares streak, double plain, double at_px[2], double *flux) {
     const bst_streak_model model = bst_generator_streak_model(g),
                            point = {.sigma_px = g->total_sigma};
-    /* on its own pixels: an object's may be beyond those of a streak at its mean place */
-    double start_px[2] = {at_px[0], at_px[1]};
-    *flux = fmin(fmax(bst_path_fit(path, &point, NULL, light, start_px).flux, 0.0), 1.0);
+    double under = light_under_point(path, g->total_sigma, at_px);
     bst_path_fit_squares fit = bst_path_fit(path, &point, &model, light, at_px);
     double own = sqrt(fmax(1.0 - fit.left / streak.all, 0.0));
+    /* a fit that explains nothing: the point is beyond the pixels of a streak at the mean place */
+    *flux = own > 0.0 ? fmin(fmax(fit.flux, 0.0), 1.0) : under;
     double other = sqrt(fmax(1.0 - streak.left / streak.all, 0.0));
     return sqrt(streak.all / plain) * (own - other);
 }
