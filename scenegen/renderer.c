@@ -170,6 +170,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         .taps = r->taps,
         .motion = r->options.motion,
         .temporal_oversample = r->options.temporal_oversample,
+        .penumbrae = r->options.penumbrae,
         .stamp_radius_px = r->options.stamp_radius_px};
     r->tolerance_sigma = smear.tolerance_sigma;
     bst_saturation_count_init(&r->saturation);

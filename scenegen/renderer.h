@@ -20,6 +20,7 @@ typedef struct bst_renderer bst_renderer;
 
 typedef struct bst_renderer_options {
     double tolerance_sigma; /* allowed image error in any pixel, in sigma of that pixel (0.05) */
+    bool penumbrae;         /* of parts of bodies on their parts (false: the Sun is a point) */
     bst_rng_key pattern;    /* random key of the detector's fixed patterns */
     bst_smear_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
     /* Fidelity settings; 0: chosen by the tolerance. Equal parts of the exposure per star; parts of

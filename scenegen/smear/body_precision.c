@@ -145,6 +145,9 @@ void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, boo
 }
 
 double bst_body_shadow_sigma(const bst_body_image_plan *d, const bst_smear_body *b, int rule) {
+    if (!d->s->options.penumbrae) {
+        return 0.0;
+    }
     double weights = 0.0, sigma_px = sqrt(d->s->sigma_px * d->s->sigma_px + 1.0 / 12.0);
     for (int k = 0; k < d->times.count; k++) {
         weights += d->times.weight[k];

@@ -28,6 +28,7 @@ typedef struct bst_smear_options {
     double law_error, law_widest;
     bst_smear_star_motion motion;
     int temporal_oversample; /* 0: by the tolerance; else number of equal parts of the exposure */
+    bool penumbrae;          /* shadows of parts on parts are those of the Sun's disc */
     int stamp_radius_px;     /* 0: by the tolerance; else of all stamps */
     /* non-Gaussian PSF, else 0: Gaussians with the same node sensitivity and the same peak pixel
      * share */

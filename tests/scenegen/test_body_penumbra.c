@@ -114,6 +114,8 @@ static void test_plate_over_plate(void **state) {
     const double au[] = {3.0, 1.0, 0.3, 0.12, 1.0}, in = atan(0.75);
     const scene_motion still = {.duration_s = 1.0, .samples = 2};
     scene_track track = scene_track_make(&camera, &still);
+    bst_renderer_options options = bst_renderer_default_options();
+    options.penumbrae = true;
     for (int n = 0; n < 5; n++) {
         bst_test_model model = bst_test_model_open(texts[n / 4]);
         double a = bst_camera_scale_rad(&camera), radius = BST_SUN_RADIUS_M / (au[n] * BST_AU_M);
@@ -132,7 +134,7 @@ static void test_plate_over_plate(void **state) {
             .body_u = {0.0, 1.0},
             .electrons_per_s = 2e7};
         bst_renderer *r;
-        bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, NULL, &r));
+        bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, &options, &r));
         bst_render_request q = {
             .window = {0, 0, SIDE, SIDE}, .track = &track.track, .sources = &source, .count = 1};
         bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
