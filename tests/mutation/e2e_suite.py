@@ -46,4 +46,5 @@ GENERAL = "tables skewed_frames figures skewed_exports main_job frames"
 def concerned(path, names):
     """Those of `names` that judge `path`, in the order in which to run them."""
     wanted = next((tests for pattern, tests in CONCERNED if re.match(pattern, path)), GENERAL).split()
+    wanted.insert(0, "figures_kept")
     return [n for n in (f"e2e_{name}" for name in wanted) if n in names]
