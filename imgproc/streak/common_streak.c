@@ -273,13 +273,13 @@ static void filter_lines(finder *f) {
     }
 }
 
-static bst_star_path_image image_of(const finder *f) {
+bst_star_path_image bst_streak_finder_image(const finder *f) {
     return (bst_star_path_image){f->smooth, f->width, f->height};
 }
 
 /* Median of the light along the path at a place. */
 static double light_along(const finder *f, double x_px, double y_px) {
-    const bst_star_path_image image = image_of(f);
+    const bst_star_path_image image = bst_streak_finder_image(f);
     float values[BST_STAR_PATH_ROOM];
     double m[3];
     bst_star_path_map(&f->path, x_px, y_px, m);
@@ -295,7 +295,7 @@ static double light_along(const finder *f, double x_px, double y_px) {
  *
  * Given:     extend  along the light of the source beyond the shape's ends */
 static bool fit_shape(finder *f, const bst_streak_shape *s, bool extend) {
-    const bst_star_path_image image = image_of(f);
+    const bst_star_path_image image = bst_streak_finder_image(f);
     double x, y;
     memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
     bst_streak_finder_flood(f, s->level, s->from, 1);
@@ -331,7 +331,7 @@ typedef struct wanted {
 
 /* Finds the stars one after the other; those that are not kept are subtracted, too. */
 static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_common_streak *out) {
-    const bst_star_path_image image = image_of(f);
+    const bst_star_path_image image = bst_streak_finder_image(f);
     const int most = q->most;
     BST_TRY(bst_path_filter_renew(ctx, &f->path, &image, NULL, f->psf_sigma_px, q->least_inside,
                                   &f->filter));
@@ -402,7 +402,7 @@ int bst_streak_finder_choose(const finder *f, const bst_common_streak *found, co
 
 /* Improves the path by stars. */
 static void refine_path(finder *f, const bst_common_streak *found, const bool *chosen) {
-    const bst_star_path_image image = image_of(f);
+    const bst_star_path_image image = bst_streak_finder_image(f);
     bst_star_path_star stars[REFINING_STARS];
     int count = bst_streak_finder_choose(f, found, chosen, stars, REFINING_STARS);
     bst_star_path_refine(&f->path, &image, stars, count);

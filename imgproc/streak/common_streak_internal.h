@@ -72,6 +72,8 @@ bool bst_streak_finder_is_covered(const bst_streak_finder *finder,
  * star left beyond its ends. Places on the paths of much brighter stars are not looked at. */
 bool bst_streak_finder_is_uneven(const bst_streak_finder *finder, const bst_path_filter_peak *peak);
 
+/* The image in which paths are measured; lent. */
+bst_star_path_image bst_streak_finder_image(const bst_streak_finder *finder);
 /* Finds all stars by the finder's path. */
 bst_status bst_streak_finder_find_all(bst_ctx *ctx, bst_streak_finder *finder,
                                       bst_common_streak *out) BST_MUST_CHECK;

@@ -48,11 +48,12 @@ static double point_lead(const bst_generator *g, const bst_star_trail_path *path
                          bst_path_fit_squares streak, double plain, double at_px[2], double *flux) {
     const bst_streak_model model = bst_generator_streak_model(g),
                            point = {.sigma_px = g->total_sigma};
-    double under = light_under_point(path, g->total_sigma, at_px);
+    const double start[2] = {at_px[0], at_px[1]};
     bst_path_fit_squares fit = bst_path_fit(path, &point, &model, light, at_px);
     double own = sqrt(fmax(1.0 - fit.left / streak.all, 0.0));
     /* a fit that explains nothing: the point is beyond the pixels of a streak at the mean place */
-    *flux = own > 0.0 ? fmin(fmax(fit.flux, 0.0), 1.0) : under;
+    *flux =
+        own > 0.0 ? fmin(fmax(fit.flux, 0.0), 1.0) : light_under_point(path, g->total_sigma, start);
     double other = sqrt(fmax(1.0 - streak.left / streak.all, 0.0));
     return sqrt(streak.all / plain) * (own - other);
 }

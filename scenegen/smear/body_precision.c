@@ -116,11 +116,17 @@ static double poses_share(const bst_body_image_plan *p, bool blurred) {
                                                         : POSES_SHARE;
 }
 
+/* Motion of the body's borders in the exposure, over the standard deviation of the PSF and pixel.
+ */
+static double border_motion(const bst_body_image_plan *p, double sigma_px) {
+    return (p->moved_px + FASTER * p->turned_px) / sigma_px;
+}
+
 void bst_body_choose_poses(bst_body_image_plan *p, bst_satellite_pose *pose, bool *blurred) {
     const bst_smear *s = p->s;
     double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
     /* the limb blurs no border of the body itself */
-    double blur = (p->moved_px + FASTER * p->turned_px) / sigma_px;
+    double blur = border_motion(p, sigma_px);
     double sigmas = blur + FASTER * p->hidden_px / sigma_px;
     double poses = fmax(0.5 * sigmas, 4.0),
            missed_e = BRIGHTER * p->light_e / (8.0 * poses * poses);
@@ -153,7 +159,7 @@ double bst_body_shadow_sigma(const bst_body_image_plan *d, const bst_smear_body 
         weights += d->times.weight[k];
     }
     double electrons = d->source->electrons_per_s * d->s->duration_s * weights;
-    double swept = b->blurred ? (d->moved_px + FASTER * d->turned_px) / sigma_px : 0.0;
+    double swept = b->blurred ? border_motion(d, sigma_px) : 0.0;
     return bst_body_penumbra_sigma(bst_resolved_image_of(b->image), rule, electrons, sigma_px,
                                    swept, d->s->dark_variance_e2);
 }
@@ -161,12 +167,12 @@ double bst_body_shadow_sigma(const bst_body_image_plan *d, const bst_smear_body 
 int bst_body_choose_sun(const bst_body_image_plan *d, const bst_smear_body *b,
                         double allowed_sigma) {
     int rule = d->sun_rule;
-    double sigma = bst_body_shadow_sigma(d, b, rule);
-    double least = PENUMBRA_SHARE * poses_share(d, b->blurred) * d->s->options.tolerance_sigma;
-    double left = fmax(allowed_sigma - (b->sigma - sigma), least);
     if (b->blurred) {
         return rule; /* as many poses again for each point: too slow for what is left */
     }
+    double sigma = bst_body_shadow_sigma(d, b, rule);
+    double least = PENUMBRA_SHARE * poses_share(d, b->blurred) * d->s->options.tolerance_sigma;
+    double left = fmax(allowed_sigma - (b->sigma - sigma), least);
     int rules =
         d->source->body->satellite->curved_count > 0 ? CURVED_SUN_RULES : BST_BODY_SUN_RULES;
     while (sigma > left && rule + 1 < rules) {

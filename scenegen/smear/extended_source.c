@@ -3,7 +3,6 @@
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "scenegen/smear/gauss_legendre.h"
 #include "scenegen/smear/smear_internal.h"
@@ -240,32 +239,18 @@ bst_status bst_extended_source_spread(bst_ctx *ctx, const bst_disc_points *point
                         "a disc of %d points on a path of %d nodes is too much", points->count,
                         list->count);
     }
-    size_t from_bytes = (size_t)list->count * sizeof *list->items;
-    bst_smear_node *from = malloc(from_bytes > 0 ? from_bytes : 1);
-    if (!from) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d nodes of a path", list->count);
-    }
-    if (from_bytes > 0) {
-        memcpy(from, list->items, from_bytes);
-    }
-    bst_status status = bst_smear_reserve(ctx, (void **)&list->items, &list->capacity,
-                                          need > 0 ? (int)need : 1, sizeof *list->items);
-    if (status != BST_OK) {
-        free(from);
-        return status;
-    }
-    size_t n = 0;
-    for (int p = 0; p < points->count; p++) {
+    BST_TRY(bst_smear_reserve(ctx, (void **)&list->items, &list->capacity, need > 0 ? (int)need : 1,
+                              sizeof *list->items));
+    for (int p = points->count - 1; p >= 0; p--) { /* from the last one: in place */
         for (int k = 0; k < list->count; k++) {
-            bst_smear_node node = from[k];
+            bst_smear_node node = list->items[k];
             node.p[0] += points->items[p].offset.x * stretch;
             node.p[1] += points->items[p].offset.y * stretch;
             node.weight *= points->items[p].share;
             node.variance += points->items[p].offset.z * stretch * stretch;
-            list->items[n++] = node;
+            list->items[(size_t)p * (size_t)list->count + (size_t)k] = node;
         }
     }
-    free(from);
     list->count = (int)need;
     return BST_OK;
 }

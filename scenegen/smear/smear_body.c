@@ -321,6 +321,7 @@ static bst_status draw(bst_ctx *ctx, const bst_body_image_plan *d, int k, bool l
     bst_resolved_view view;
     double weight = d->times.weight[k];
     pose_at(d->s, d->source, d->times.u[k], pose, &view, &light, &earthlight);
+    light.penumbrae = d->s->options.penumbrae;
     light.shadow_at[0] = d->times.shadow_at[k][0];
     light.shadow_at[1] = d->times.shadow_at[k][1];
     view.curved_px = d->curved_px;

@@ -353,10 +353,6 @@ static void find_bins(bst_facet_layers *l) {
 static bool any_bin(const bst_facet_layers *l, int facet, const uint8_t *marks) {
     const int *at = l->bins[facet];
     int found = 0;
-    if (at[1] - at[0] <= 1 && at[3] - at[2] <= 1) { /* most */
-        const uint8_t *up = marks + at[2] * l->bins_x, *down = marks + at[3] * l->bins_x;
-        return (up[at[0]] | up[at[1]] | down[at[0]] | down[at[1]]) != 0;
-    }
     for (int j = at[2]; j <= at[3]; j++) {
         for (int i = at[0]; i <= at[1]; i++) {
             found |= marks[j * l->bins_x + i];

@@ -280,7 +280,7 @@ static double add_facet(const bst_resolved_adding *a, int facet, const light_vie
         if (!s->lit[n].doubtful[facet] || bst_facet_layers_cut(&s->lit[n], facet)) {
             even += light;
         } else {
-            if (n == 0 && !bst_polygon_clip_is_empty(&s->lit[0].clip)) {
+            if (n == 0 && a->light->penumbrae && !bst_polygon_clip_is_empty(&s->lit[0].clip)) {
                 double gap_m = bst_facet_layers_gap(&s->lit[0], facet);
                 bst_resolved_note_shadow(a, s->planes[facet].normal, s->middles[facet], light,
                                          gap_m);

@@ -291,7 +291,7 @@ static bst_status add_lit_part(bst_ctx *ctx, const bst_resolved_adding *a, const
         split = fraction > 0.0 && fraction < 1.0;
         lit = split ? 1.0 : fraction;
     }
-    if (split) {
+    if (split && a->light->penumbrae) {
         bst_resolved_note_shadows_on(a, p->facet, s.sun);
     }
     s.sun *= lit;

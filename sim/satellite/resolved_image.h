@@ -39,6 +39,7 @@ typedef struct bst_resolved_light {
     double sun_radius_rad;            /* angular radius of the Sun's disc; 0: a point */
     double shadow_at[2];              /* point of the disc that casts the shadows, from its centre:
                                          right and up in any axes, in radii of the disc */
+    bool penumbrae;                   /* find the widths in bst_resolved_image.penumbrae */
     const bst_earthlight *earthlight; /* NULL: none */
     const bst_resolved_gain *gain;    /* [material_count] */
 } bst_resolved_light;

@@ -119,7 +119,7 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
     assert(fix && orbit && filter);
     const bst_vec3 r = fix->position_m, v = fix->velocity_mps;
     const double turn_radps = bst_vec3_norm(v) / bst_vec3_norm(r);
-    double root[N][N], unused[N], covariance[N][N];
+    double root[N][N], middle[N], covariance[N][N];
     bst_ctx quiet = {0};
     memcpy(covariance, fix->covariance, sizeof covariance);
     for (int k = 0; k < N; k++) {
@@ -130,14 +130,13 @@ bool bst_custody_start(const bst_custody_fix *fix, double photocentre_m, bst_cus
                              .epoch_utc_jd2 = fix->epoch_utc_jd[1]};
     memset(filter, 0, sizeof *filter);
     if (!bst_custody_root(fix->covariance, root) || !bst_custody_root(covariance, root) ||
-        !numbers_through(r, v, false, &elements, unused) ||
+        !numbers_through(r, v, false, &elements, middle) ||
         bst_custody_orbit_init(&quiet, &elements, -fix->time_s, photocentre_m, orbit) != BST_OK) {
         return false;
     }
     const bool osculating = bst_custody_osculates(&elements);
-    double middle[N], shift[N] = {0.0};
-    bst_elements same = elements;
-    if (!numbers_through(r, v, osculating, &same, middle)) {
+    double shift[N] = {0.0};
+    if (osculating && !osculating_numbers(r, v, middle)) {
         return false;
     }
     for (int k = 0; k < N; k++) {
