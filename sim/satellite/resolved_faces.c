@@ -400,7 +400,7 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
         if (lit > 0.0 && (view == 0 || bst_vec3_dot(normal, a->light->earthlight->centre) > 0.05)) {
             lit = bst_resolved_lit_fraction(a, facet, view);
         }
-        if (view == 0 && a->light->penumbrae && lit > 0.0 && lit < 1.0) {
+        if (view == 0 && lit > 0.0 && lit < 1.0 && a->light->penumbrae) {
             bst_resolved_note_shadows_on(a, facet, s.sun);
         }
         if (lit >= 1.0) {
