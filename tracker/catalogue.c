@@ -10,7 +10,7 @@ struct bst_tracker_catalogue {
     const bst_knowledge *knowledge;
     bst_knowledge_view *view;
     double sigma_m, sigma_mps, mag_sigma;
-    double seconds;
+    double seconds, clock_sigma_s;
     int32_t cue_object;
     bool failed; /* the latest search */
     int *near;   /* [number of objects] */
@@ -53,8 +53,9 @@ void bst_tracker_catalogue_free(bst_tracker_catalogue *c) {
     }
 }
 
-int32_t bst_tracker_catalogue_set(bst_tracker_catalogue *c, double seconds) {
+int32_t bst_tracker_catalogue_set(bst_tracker_catalogue *c, double seconds, double clock_sigma_s) {
     c->seconds = seconds;
+    c->clock_sigma_s = clock_sigma_s;
     c->failed = false;
     c->cue_object = bst_knowledge_cue_object(c->view);
     return c->cue_object;
@@ -77,13 +78,18 @@ static bool predict(const bst_tracker_catalogue *c, const bst_tracker_search *se
         return false;
     }
     bool bright = isfinite(now.v_mag);
-    *out = (bst_identity_object){.object = object,
-                                 .direction = now.geometric,
-                                 .rate_radps = bst_vec3_scale(bst_vec3_sub(after, before), 0.5 / h),
-                                 .sigma_rad = c->sigma_m / now.range_m,
-                                 .rate_sigma_radps = c->sigma_mps / now.range_m,
-                                 .v_mag = bright ? now.v_mag : 0.0,
-                                 .v_mag_sigma = bright ? c->mag_sigma : INFINITY};
+    bst_vec3 rate = bst_vec3_scale(bst_vec3_sub(after, before), 0.5 / h);
+    bst_vec3 turn = bst_vec3_scale(bst_vec3_axpy(bst_vec3_add(before, after), -2.0, now.geometric),
+                                   1.0 / (h * h));
+    *out = (bst_identity_object){
+        .object = object,
+        .direction = now.geometric,
+        .rate_radps = rate,
+        .sigma_rad = hypot(c->sigma_m / now.range_m, c->clock_sigma_s * bst_vec3_norm(rate)),
+        .rate_sigma_radps =
+            hypot(c->sigma_mps / now.range_m, c->clock_sigma_s * bst_vec3_norm(turn)),
+        .v_mag = bright ? now.v_mag : 0.0,
+        .v_mag_sigma = bright ? c->mag_sigma : INFINITY};
     return true;
 }
 
@@ -133,6 +139,24 @@ int bst_tracker_catalogue_near(void *user, const bst_tracker_search *search,
         off[at] = this_off;
     }
     return count;
+}
+
+bool bst_tracker_catalogue_sight(void *user, int32_t object, bst_clock_sight *out) {
+    const bst_tracker_catalogue *c = user;
+    bst_ctx quiet = {0}; /* after the end of an orbit there is no direction: no error here */
+    bst_onboard_line line;
+    if (bst_knowledge_line_at(&quiet, c->view, object, c->seconds, &line) != BST_OK) {
+        return false;
+    }
+    *out = (bst_clock_sight){.object = object,
+                             .direction = line.direction,
+                             .range_m = line.range_m,
+                             .object_m = line.object.position_m,
+                             .object_mps = line.object.velocity_mps,
+                             .observer_m = line.eye.position_m,
+                             .observer_mps = line.eye.velocity_mps,
+                             .corrected_s = bst_knowledge_view_clock_s(c->view)};
+    return true;
 }
 
 bool bst_tracker_catalogue_failed(const bst_tracker_catalogue *c) {

@@ -16,15 +16,19 @@ bst_status bst_tracker_catalogue_create(bst_ctx *ctx, const bst_tracker_config *
 /* Frees it; NULL is allowed. */
 void bst_tracker_catalogue_free(bst_tracker_catalogue *catalogue);
 
-/* Sets the time of the next search, s since the epoch.
+/* Sets the time of the next search, s since the epoch, and the 1 sigma of its clock.
  *
  * Returned:  index of the cue's object, which searches leave out; negative: none */
-int32_t bst_tracker_catalogue_set(bst_tracker_catalogue *catalogue, double seconds);
+int32_t bst_tracker_catalogue_set(bst_tracker_catalogue *catalogue, double seconds,
+                                  double clock_sigma_s);
 
 /* Finds objects: a bst_tracker_near_fn whose user is the catalogue. Left out are the spacecraft
  * itself, objects behind the Earth, in its umbra, and those without an orbit. */
 int bst_tracker_catalogue_near(void *user, const bst_tracker_search *search,
                                bst_identity_object *out, int room, int *left_out);
+/* Predicts one object at the time that was set: a bst_tracker_sight_fn whose user is the
+ * catalogue. */
+bool bst_tracker_catalogue_sight(void *user, int32_t object, bst_clock_sight *out);
 /* True if a search since the time was set found no place of the spacecraft. */
 bool bst_tracker_catalogue_failed(const bst_tracker_catalogue *catalogue);
 

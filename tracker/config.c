@@ -191,4 +191,11 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, catalogue_mag_sigma, "mag", 0.01, 100, "1", "The same of their magnitudes."),
     BST_REAL(C, uncatalogued_per_field, "", 1e-9, 1e6, "0.1",
              "Believed mean number of objects in a field that the catalogue lacks."),
+    BST_REAL(C, clock_sigma_s, "s", 0, 1e4, "0",
+             "Standard deviation of the onboard clock's offset before the flight. It is then "
+             "learnt from the places of identified objects, with catalogue_sigma_m and "
+             "catalogue_sigma_mps, and corrected; 0: the clock is taken to be right."),
+    BST_REAL(C, navigation_sigma_m, "m", 0, 1e7, "10",
+             "Standard deviation per axis of the navigated position, where the clock's offset is "
+             "learnt."),
     BST_CONFIG_END};

@@ -224,6 +224,18 @@ static bool is_known(bst_quat q) {
     return q.x != 0.0 || q.y != 0.0 || q.z != 0.0 || q.w != 0.0;
 }
 
+/* Adds the uncertainty of the onboard clock to that of the cue. */
+static bst_status widen_by_clock(tracker_module *m, struct bst_step *step, double seconds,
+                                 double sigma_s, bst_onboard_cue *cue) {
+    bst_onboard_cue later;
+    BST_TRY(bst_knowledge_cue_at(bst_step_ctx(step), m->view, seconds + sigma_s, &later));
+    bst_vec3 turned = bst_vec3_sub(later.rate_gcrf_radps, cue->rate_gcrf_radps);
+    cue->sigma_rad =
+        hypot(cue->sigma_rad, bst_vec3_angle(later.direction_gcrf, cue->direction_gcrf));
+    cue->rate_sigma_radps = hypot(cue->rate_sigma_radps, bst_vec3_norm(turned));
+    return BST_OK;
+}
+
 /* Processes a detections message: tracker step, tracks and predictions. */
 static bst_status process_detections(tracker_module *m, struct bst_step *step,
                                      const bst_detections *detections) {
@@ -261,6 +273,11 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
     }
     bst_onboard_cue cue;
     BST_TRY(bst_knowledge_cue_at(bst_step_ctx(step), m->view, seconds, &cue));
+    double clock_sigma_s =
+        bst_tracker_clock_sigma_s(m->tracker, bst_knowledge_view_clock_s(m->view));
+    if (clock_sigma_s > 0.0) {
+        BST_TRY(widen_by_clock(m, step, seconds, clock_sigma_s, &cue));
+    }
     input.cue = (bst_tracker_cue){.valid = cue.valid,
                                   .direction_gcrf = cue.direction_gcrf,
                                   .rate_gcrf_radps = cue.rate_gcrf_radps,
@@ -277,14 +294,19 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
     }
     if (m->catalogue) {
         input.near = bst_tracker_catalogue_near;
+        input.sight = bst_tracker_catalogue_sight;
         input.near_user = m->catalogue;
-        input.cue_object = bst_tracker_catalogue_set(m->catalogue, seconds);
+        input.cue_object = bst_tracker_catalogue_set(m->catalogue, seconds, clock_sigma_s);
     }
     int track_room, prediction_room;
     bst_tracks *tracks = bst_step_write(step, PORT_TRACKS, &track_room);
     bst_predictions *predictions = bst_step_write(step, PORT_PREDICTIONS, &prediction_room);
     bst_tracker_outcome outcome =
         bst_tracker_step(m->tracker, &input, tracks, track_room, predictions, prediction_room);
+    if (tracks->clock_sigma_s > 0.0 &&
+        bst_knowledge_view_set_clock(m->view, tracks->clock_offset_s, tracks->clock_sigma_s)) {
+        bst_tracker_cue_corrected(m->tracker);
+    }
     assert(bst_tracks_are_valid(tracks, track_room));
     assert(bst_predictions_are_valid(predictions, prediction_room));
     if (bst_tracker_identity(m->tracker)) {

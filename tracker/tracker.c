@@ -151,6 +151,9 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     if (status == BST_OK) {
         status = bst_tracker_identity_create(ctx, config, t);
     }
+    if (status == BST_OK) {
+        status = bst_tracker_clock_create(ctx, config, t);
+    }
     t->smoother_room = 2 * (int)config->max_tracks;
     if (status == BST_OK && config->smoothing_lag_frames > 0) {
         status = bst_smoother_create(ctx, t->smoother_room, (int)config->smoothing_lag_frames,
@@ -171,6 +174,7 @@ void bst_tracker_free(bst_tracker *t) {
     bst_mtt_free(t->mtt);
     bst_smoother_free(t->smoother);
     free(t->identity);
+    free(t->clock);
     bst_pages_free(t->cache);
     bst_pages_free(t->stars);
     bst_pages_free(t->detections);
@@ -194,6 +198,7 @@ bst_status bst_tracker_archive(bst_tracker *t, bst_archive *archive) {
         t->event_count = 0;
     }
     BST_TRY(bst_tracker_identity_archive(t, archive));
+    BST_TRY(bst_tracker_clock_archive(t, archive));
     BST_TRY(bst_smoother_archive(t->smoother, t->smoother_room, archive));
     return bst_mtt_archive(t->mtt, archive);
 }
@@ -364,11 +369,14 @@ static void write_tracks(const bst_tracker *t, const bst_detections *d, const bs
                          int capacity) {
     int count;
     const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &count);
-    *out = (bst_tracks){.exposure_id = d->exposure_id,
-                        .tick = fix->tick,
-                        .attitude = *fix,
-                        .target_id = t->target.id,
-                        .lost = bst_mtt_lost(t->mtt) + detections_lost};
+    *out = (bst_tracks){
+        .exposure_id = d->exposure_id,
+        .tick = fix->tick,
+        .attitude = *fix,
+        .target_id = t->target.id,
+        .clock_offset_s = t->clock ? t->clock->state[0] : 0.0,
+        .clock_sigma_s = t->clock ? bst_clock_sigma_s(t->clock, &t->clock_params) : 0.0,
+        .lost = bst_mtt_lost(t->mtt) + detections_lost};
     for (int i = 0; i < count; i++) {
         out->at_rest += all[i].at_rest;
     }
@@ -525,6 +533,9 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     if (t->identity && input->near) {
         bst_tracker_identify(t, input, attitude.usable, &frame, &view.cue);
     }
+    if (t->clock && input->sight && attitude.usable) {
+        bst_tracker_learn_clock(t, input, &frame);
+    }
     choose_target(t, &view.cue, seconds);
     smooth(t, &(bst_smoother_frame){d->exposure_id, tick, seconds, t->target.id});
     write_tracks(t, d, &attitude.fix, &view.cue, detections_lost, tracks, track_capacity);
@@ -543,9 +554,13 @@ const bst_identity *bst_tracker_identity(const bst_tracker *t) {
     return t->identified ? t->identity : NULL;
 }
 
+void bst_tracker_cue_corrected(bst_tracker *t) {
+    t->cue_before.valid = false; /* the change of the cue is no motion of a track */
+}
+
 void bst_tracker_retarget(bst_tracker *t) {
     t->target = (bst_target){.id = 0};
-    t->cue_before.valid = false; /* the change of the cue is no motion of a track */
+    bst_tracker_cue_corrected(t);
 }
 
 int bst_tracker_smoothed_room(const bst_tracker_config *config) {

@@ -11,6 +11,7 @@
 #include "boresight/config.h"
 #include "boresight/messages.h"
 #include "sim/astro/belt.h"
+#include "tracker/clock_offset.h"
 #include "tracker/identity.h"
 #include "tracker/mtt/filter.h"
 
@@ -47,6 +48,7 @@ typedef struct bst_tracker_config {
     int64_t smoothing_lag_frames;
     double identity_period_s, catalogue_sigma_m, catalogue_sigma_mps, catalogue_mag_sigma,
         uncatalogued_per_field;
+    double clock_sigma_s, navigation_sigma_m;
 } bst_tracker_config;
 
 extern const bst_config_desc bst_tracker_config_table[];
@@ -87,6 +89,9 @@ typedef struct bst_tracker_search {
 typedef int (*bst_tracker_near_fn)(void *user, const bst_tracker_search *search,
                                    bst_identity_object *out, int room, int *left_out);
 
+/* Predicts a catalogue object at mid-exposure, also the cue's. False: it has no place. */
+typedef bool (*bst_tracker_sight_fn)(void *user, int32_t object, bst_clock_sight *out);
+
 typedef struct bst_tracker_input {
     const bst_detections *detections;
     const bst_nav_telemetry *nav; /* required */
@@ -98,7 +103,8 @@ typedef struct bst_tracker_input {
     /* cue at mid-exposure */
     bst_tracker_cue cue;
     bst_tracker_near_fn near; /* NULL: no catalogue */
-    void *near_user;
+    bst_tracker_sight_fn sight;
+    void *near_user;    /* of both */
     int32_t cue_object; /* index in the catalogue; negative: none */
 } bst_tracker_input;
 
@@ -186,6 +192,13 @@ void bst_tracker_smoothed(const bst_tracker *tracker, bst_tracks_smoothed *out, 
 /* Probabilities over the catalogue's objects, if the tracks were compared with it in the latest
  * processed frame; else NULL. Valid until the next step. */
 const bst_identity *bst_tracker_identity(const bst_tracker *tracker);
+
+/* 1 sigma of what the onboard clock's offset differs from `corrected_s`, s; 0: no offset is
+ * estimated. */
+double bst_tracker_clock_sigma_s(const bst_tracker *tracker, double corrected_s);
+
+/* Announces that the cue has been corrected: its change to the next frame is no motion. */
+void bst_tracker_cue_corrected(bst_tracker *tracker);
 
 /* Announces a new cue from the next frame on: no track is the target until it fits the new cue. */
 void bst_tracker_retarget(bst_tracker *tracker);

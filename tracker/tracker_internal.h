@@ -41,6 +41,8 @@ struct bst_tracker {
     bst_identity *identity; /* latest comparison; NULL: none are made */
     double identified_s;    /* its time */
     bool identified;        /* in the latest frame */
+    bst_clock_params clock_params;
+    bst_clock *clock;       /* NULL: the onboard clock is right */
     bst_smoother *smoother; /* NULL: no smoothing */
     int smoother_room;      /* also without one */
     cached_star *cache;
@@ -130,5 +132,20 @@ bst_status bst_tracker_identity_archive(bst_tracker *t, bst_archive *archive) BS
  * Given:     usable  the frame has an attitude */
 void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool usable,
                           const bst_mtt_frame *frame, bst_target_cue *cue);
+
+/* ---- clock_learning.c ---- */
+
+/* Sets the parameters of the clock's offset; allocates its state.
+ *
+ * Errors:    BST_ERR_CONFIG, BST_ERR_MEMORY */
+bst_status bst_tracker_clock_create(bst_ctx *ctx, const bst_tracker_config *config,
+                                    bst_tracker *t) BST_MUST_CHECK;
+/* Saves or restores the clock's offset; a change during a run may switch its estimation on or off.
+ *
+ * Errors:    BST_ERR_FORMAT */
+bst_status bst_tracker_clock_archive(bst_tracker *t, bst_archive *archive) BST_MUST_CHECK;
+/* Updates the clock's offset by the detections of tracks of known objects. */
+void bst_tracker_learn_clock(bst_tracker *t, const bst_tracker_input *input,
+                             const bst_mtt_frame *frame);
 
 #endif

@@ -9,7 +9,7 @@
 
 #pragma GCC visibility push(default)
 
-#define BST_MODULE_ABI 6
+#define BST_MODULE_ABI 7
 
 struct bst_camera;    /* boresight/camera.h */
 struct bst_world;     /* sim/world: the truth */

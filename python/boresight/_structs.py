@@ -253,7 +253,7 @@ class CompensatorStage(ctypes.Structure):
 
 STAGE_ABI = 2
 """BST_STAGE_ABI."""
-MODULE_ABI = 6
+MODULE_ABI = 7
 """BST_MODULE_ABI."""
 
 ALL: List[Type[Any]] = [Context, ModelOptions, SimOptions, SimObserver, SimMessage, SimFrame, SimColumns, Vec3,

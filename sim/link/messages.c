@@ -320,6 +320,8 @@ static const bst_wire_field tracks[] = {
     REAL(bst_tracks, FIX(rms_px), "px", "Of the stars' residuals."),
     BOUNDED(bst_tracks, FIX(shared), 0, 1, "", "Variance that successive frames share, of all."),
     NUMBER(bst_tracks, target_id, 0, "Track of interest, 0 when none."),
+    REAL(bst_tracks, clock_offset_s, "s", "Onboard clock less true time, as learnt from objects."),
+    BOUNDED(bst_tracks, clock_sigma_s, 0, 1e6, "s", "Its standard deviation; 0: not estimated."),
     INT(bst_tracks, at_rest, 0, MANY, "",
         "Number of stationary tracks, which are not among the items."),
     COUNT(bst_tracks, "Items."),

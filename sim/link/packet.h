@@ -12,7 +12,7 @@
 enum {
     /* increases with every change of layout or meaning of a message or header member; a peer with
      * another version is rejected (test link_wire) */
-    BST_LINK_VERSION = 8,
+    BST_LINK_VERSION = 9,
     BST_LINK_HEADER_BYTES = 1024, /* maximum size of a header */
     BST_LINK_PARTS = 2,           /* after the header: payload, pixels */
     BST_LINK_INSTANCE_BYTES = 160,

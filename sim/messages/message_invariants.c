@@ -135,7 +135,9 @@ static bool is_track(const bst_track *t) {
 }
 
 bool bst_tracks_are_valid(const bst_tracks *t, int capacity) {
-    bool valid = is_count(t->count, t->lost, capacity) && t->target_id >= 0 && t->at_rest >= 0;
+    bool valid = is_count(t->count, t->lost, capacity) && t->target_id >= 0 && t->at_rest >= 0 &&
+                 isfinite(t->clock_offset_s) && t->clock_sigma_s >= 0.0 &&
+                 isfinite(t->clock_sigma_s);
     if (t->attitude.valid) {
         const double *sigma = t->attitude.sigma_rad, *c = t->attitude.correlation;
         valid = valid && is_attitude(t->attitude.q_cam_from_gcrf) && t->attitude.stars >= 0 &&

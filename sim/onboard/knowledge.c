@@ -160,11 +160,30 @@ static const world_sensor *sensor_of(const bst_knowledge *k) {
 bst_status bst_onboard_nav_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
                                bst_world_state *eye) {
     const bst_knowledge *k = view->knowledge;
-    *t = bst_world_nav_seconds(k->world, k->observer, k->sensor, seconds);
+    *t = bst_world_nav_seconds(k->world, k->observer, k->sensor, seconds) - view->clock_offset_s;
     BST_TRY(bst_world_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
                                   k->world->epoch, *t, true, eye));
     bst_world_nav_estimate(k->world, k->observer, k->sensor, *t, eye);
     return BST_OK;
+}
+
+void bst_onboard_forget_cue(bst_knowledge_view *view) {
+    view->any_checked = false;
+    memset(view->knots, 0, sizeof view->knots);
+}
+
+bool bst_knowledge_view_set_clock(bst_knowledge_view *view, double offset_s, double sigma_s) {
+    assert(isfinite(offset_s) && sigma_s >= 0.0);
+    if (!(fabs(offset_s - view->clock_offset_s) > sigma_s / 3.0)) {
+        return false;
+    }
+    view->clock_offset_s = offset_s;
+    bst_onboard_forget_cue(view);
+    return true;
+}
+
+double bst_knowledge_view_clock_s(const bst_knowledge_view *view) {
+    return view->clock_offset_s;
 }
 
 /* Direction of the target on its nominal orbit, by onboard navigation. */

@@ -54,6 +54,12 @@ bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledg
 /* Frees a view; the knowledge itself stays; NULL is allowed. */
 void bst_knowledge_view_free(bst_knowledge_view *view);
 
+/* Corrects the view's times by an estimate of the onboard clock's offset, if it differs from that
+ * in use by a third of its sigma or more. True: it did, and the cue has changed. */
+bool bst_knowledge_view_set_clock(bst_knowledge_view *view, double offset_s, double sigma_s);
+/* The clock offset in use, s; 0: none was set. */
+double bst_knowledge_view_clock_s(const bst_knowledge_view *view);
+
 /* Archives the task of a view and its directions of the cue. A task for an object that the
  * catalogue lacks is a range error of the archive. */
 void bst_knowledge_view_archive(bst_knowledge_view *view, bst_archive *archive);
@@ -140,6 +146,15 @@ bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double s
  * light: the same bits in a third of the time. BST_ERR_NUMERIC: an orbit has ended. */
 bst_status bst_knowledge_direction_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
                                       double seconds, bst_vec3 *geometric) BST_MUST_CHECK;
+/* An object of the onboard catalogue and the spacecraft by onboard navigation, geocentric, GCRF. */
+typedef struct bst_onboard_line {
+    bst_vec3 direction; /* as by bst_knowledge_direction_at */
+    double range_m;
+    bst_world_state eye, object; /* at reception, at emission */
+} bst_onboard_line;
+/* The line of sight to an object at `seconds`. BST_ERR_NUMERIC: an orbit has ended. */
+bst_status bst_knowledge_line_at(bst_ctx *ctx, bst_knowledge_view *view, int object, double seconds,
+                                 bst_onboard_line *out) BST_MUST_CHECK;
 /* Predicted sight of an object from the estimated observer state. BST_ERR_NUMERIC: an orbit has
  * ended. */
 bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,

@@ -113,6 +113,18 @@ bst_status bst_knowledge_direction_at(bst_ctx *ctx, bst_knowledge_view *view, in
     return BST_OK;
 }
 
+bst_status bst_knowledge_line_at(bst_ctx *ctx, bst_knowledge_view *view, int object, double seconds,
+                                 bst_onboard_line *out) {
+    assert(view && out && isfinite(seconds));
+    line_of_sight los;
+    BST_TRY(line_of_sight_at(ctx, view, object, seconds, &los));
+    *out = (bst_onboard_line){.direction = bst_vec3_unit(los.line_m),
+                              .range_m = bst_vec3_norm(los.line_m),
+                              .eye = los.eye,
+                              .object = los.target};
+    return BST_OK;
+}
+
 bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
                                   double seconds, bst_world_sight *out) {
     assert(view && out && isfinite(seconds));
@@ -158,8 +170,7 @@ bool bst_knowledge_view_task(bst_knowledge_view *view, const bst_task *task) {
     }
     view->task = *task;
     view->tasked = task->object >= 0 && task->object < view->knowledge->world->object_count;
-    view->any_checked = false;
-    memset(view->knots, 0, sizeof view->knots);
+    bst_onboard_forget_cue(view);
     return true;
 }
 
@@ -175,8 +186,7 @@ static void archive_own_cue(bst_knowledge_view *view, bst_archive *archive) {
     bst_archive_bool(archive, &view->cue_changed);
     if (object != own || memcmp(&error, &own_error, sizeof error) != 0) {
         view->cue_changed = true;
-        view->any_checked = false;
-        memset(view->knots, 0, sizeof view->knots);
+        bst_onboard_forget_cue(view);
     }
 }
 
@@ -199,5 +209,6 @@ void bst_knowledge_view_archive(bst_knowledge_view *view, bst_archive *archive) 
     bst_archive_bool(archive, &view->any_checked);
     bst_archive_bool(archive, &view->smooth);
     BST_ARCHIVE(archive, view->cued);
+    BST_ARCHIVE(archive, view->clock_offset_s);
     archive_own_cue(view, archive);
 }

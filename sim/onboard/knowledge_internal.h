@@ -35,12 +35,16 @@ struct bst_knowledge_view {
     int64_t checked;
     bool any_checked, smooth;
     bst_vec3 cued[BST_QUINTIC_POINTS];
-    bst_task task;    /* latest task */
-    bool tasked;      /* the task's object is the cue, without cue error */
-    bool cue_changed; /* since the state was saved: the view was not asked yet */
+    bst_task task;         /* latest task */
+    bool tasked;           /* the task's object is the cue, without cue error */
+    double clock_offset_s; /* taken from the onboard time */
+    bool cue_changed;      /* since the state was saved: the view was not asked yet */
 };
 
-/* Onboard time, and the estimated observer state. */
+/* Forgets the cached directions of the cue. */
+void bst_onboard_forget_cue(bst_knowledge_view *view);
+
+/* Onboard time as corrected, and the estimated observer state. */
 bst_status bst_onboard_nav_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
                                bst_world_state *eye) BST_MUST_CHECK;
 

@@ -270,6 +270,8 @@ static void send_full_tracks(bst_ctx *ctx, bst_recorder *recorder) {
     PUT(a, correlation[2], "attitude_correlation_yz");
     PUT(a, rms_px, "attitude_rms_px");
     PUT(a, shared, "attitude_shared");
+    PUT(t, clock_offset_s, "clock_offset_s");
+    PUT(t, clock_sigma_s, "clock_sigma_s");
     table = "tracks";
     t->count = 1;
     bst_track *k = &t->items[0];

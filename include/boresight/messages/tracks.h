@@ -65,7 +65,10 @@ typedef struct bst_tracks {
     int64_t tick;
     bst_attitude_fix attitude;
     int64_t target_id; /* track of interest, 0 when none */
-    int32_t at_rest;   /* number of tracks that do not move relative to the stars; not in items */
+    /* onboard clock minus true time as learnt from objects' places, and its standard deviation, s;
+     * sigma 0: not estimated */
+    double clock_offset_s, clock_sigma_s;
+    int32_t at_rest; /* number of tracks that do not move relative to the stars; not in items */
     int32_t count, lost;
     bst_track items[];
 } bst_tracks;

@@ -97,7 +97,7 @@ _TABLES = {
         "exposure_id:i8 tick:i8 attitude.valid:i4 attitude.stars:i4 attitude.tick:i8 "
         "attitude.q_cam_from_gcrf:f8x4 attitude.error_cam_rad:f8x3 "
         "attitude.sigma_rad:f8x3 attitude.correlation:f8x3 attitude.rms_px:f8 attitude.shared:f8 "
-        "target_id:i8 at_rest:i4 count:i4 "
+        "target_id:i8 clock_offset_s:f8 clock_sigma_s:f8 at_rest:i4 count:i4 "
         "lost:i4",
         "id:i8 status:i4 target_of_interest:i4 direction_gcrf:f8x3 rate_gcrf_radps:f8x3 "
         "covariance:f8x16 v_mag:f8 snr:f8 score:f8 hits:i4 misses_in_row:i4 first_tick:i8 "

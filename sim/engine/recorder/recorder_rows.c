@@ -434,6 +434,8 @@ bst_status bst_recorder_track_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     }
     put_real(&r, a->valid ? a->rms_px : NAN);
     put_real(&r, a->valid ? a->shared : NAN);
+    put_real(&r, t->clock_sigma_s > 0.0 ? t->clock_offset_s : NAN);
+    put_real(&r, t->clock_sigma_s > 0.0 ? t->clock_sigma_s : NAN);
     BST_TRY(append(ctx, recorder, BST_TABLE_TRACK_FRAMES, &r));
     for (int i = 0; i < t->count; i++) {
         BST_TRY(track_row(ctx, recorder, sensor, t, &t->items[i]));

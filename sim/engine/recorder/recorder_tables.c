@@ -236,6 +236,8 @@ static const bst_io_column track_frame_columns[] = {
     REAL("attitude_rms_px", "px", "residuals of the stars"),
     REAL("attitude_shared", "",
          "share of the variance about camera x and y that successive frames have in common"),
+    REAL("clock_offset_s", "s", "onboard clock less true time, learnt from objects' places"),
+    REAL("clock_sigma_s", "s", "standard deviation of it; both empty: not estimated"),
 };
 static const bst_io_column track_columns[] = {
     SENSOR,
