@@ -1,4 +1,4 @@
-/* Which detections tell the offset of the onboard clock. */
+/* Which detections show the offset of the onboard clock. */
 #include <stdlib.h>
 
 #include "tracker/tracker_internal.h"
@@ -87,7 +87,7 @@ void bst_tracker_learn_clock(bst_tracker *t, const bst_tracker_input *input,
     bst_clock *c = t->clock;
     int count;
     const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
-    if ((c->started && frame->seconds - c->time_s < PERIOD_S) ||
+    if (!c || !input->sight || (c->started && frame->seconds - c->time_s < PERIOD_S) ||
         frame->seconds - t->identified_s > t->identity_period_s) {
         return;
     }

@@ -17,19 +17,15 @@ static const double OBSERVER_TIME_S = 600.0;
 /* Random walk of the clock: variance per time, s^2/s (0.3 ms in a day). */
 static const double CLOCK_WALK_S = 1e-12;
 
-static double square(double v) {
-    return v * v;
-}
-
 double bst_clock_sigma_s(const bst_clock *c, const bst_clock_params *p) {
     return c->started ? sqrt(c->covariance[0][0]) : p->sigma_s;
 }
 
 static void start(bst_clock *c, const bst_clock_params *p, double seconds) {
     *c = (bst_clock){.started = true, .time_s = seconds};
-    c->covariance[0][0] = square(p->sigma_s);
+    c->covariance[0][0] = p->sigma_s * p->sigma_s;
     for (int i = 0; i < 3; i++) {
-        c->covariance[OBSERVER + i][OBSERVER + i] = square(p->observer_sigma_m);
+        c->covariance[OBSERVER + i][OBSERVER + i] = p->observer_sigma_m * p->observer_sigma_m;
     }
     for (int k = 0; k < BST_CLOCK_OBJECTS; k++) {
         c->object[k] = -1;
@@ -47,7 +43,7 @@ void bst_clock_predict(bst_clock *c, const bst_clock_params *p, double seconds) 
     c->covariance[0][0] += CLOCK_WALK_S * dt;
     for (int i = 0; i < 3; i++) {
         c->covariance[OBSERVER + i][OBSERVER + i] +=
-            square(p->observer_sigma_m) / OBSERVER_TIME_S * dt;
+            p->observer_sigma_m * p->observer_sigma_m / OBSERVER_TIME_S * dt;
     }
     for (int k = 0; k < BST_CLOCK_OBJECTS; k++) {
         for (int i = 0; i < 3 && c->object[k] >= 0; i++) {
@@ -75,7 +71,7 @@ static int slot_of(bst_clock *c, const bst_clock_params *p, int32_t object) {
             c->covariance[n][i] = c->covariance[i][n] = 0.0;
         }
         c->state[n] = 0.0;
-        c->covariance[n][n] = square(p->object_sigma_m);
+        c->covariance[n][n] = p->object_sigma_m * p->object_sigma_m;
     }
     return first;
 }
@@ -150,6 +146,7 @@ bool bst_clock_measure(bst_clock *c, const bst_clock_params *p, const bst_clock_
     bst_vec3 object_axes[3], observer_axes[3];
     bst_vec3 off = bst_tangent_log(s->direction, m->direction);
     if (!(p->object_sigma_m < MOST_ERROR_RAD * s->range_m) ||
+        !(bst_vec3_dot(s->direction, m->direction) > 0.0) ||
         !(bst_vec3_norm(off) < 4.0 * MOST_ERROR_RAD) ||
         !axes_of(s->object_m, s->object_mps, object_axes) ||
         !axes_of(s->observer_m, s->observer_mps, observer_axes)) {
@@ -162,7 +159,8 @@ bool bst_clock_measure(bst_clock *c, const bst_clock_params *p, const bst_clock_
         bst_vec3_scale(bst_tangent_project(d, bst_vec3_axpy(a, -2.0 * bst_vec3_dot(d, v), rate)),
                        1.0 / s->range_m);
     /* second order of the offset: mean square of half the acceleration times its square */
-    double open = square(c->state[0] - s->corrected_s) + c->covariance[0][0];
+    double left_s = c->state[0] - s->corrected_s;
+    double open = left_s * left_s + c->covariance[0][0];
     bst_vec3 bend = bst_vec3_scale(turn, 0.5 * sqrt(3.0) * open);
     bst_tangent at = bst_tangent_at(d), from = bst_tangent_at(m->direction);
     double r[3];

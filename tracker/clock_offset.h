@@ -4,8 +4,8 @@
  * displaces predicted directions by their rate times the offset. An error of an orbit along its
  * track looks nearly the same. The filter therefore estimates these errors with the offset: one of
  * the observer's position and one of each object's, in the axes of its orbit (radial, along,
- * across), where they stay for long. Many objects, or one on a known orbit, tell the offset; what
- * cannot be told apart stays in its variance. Stars show the offset by aberration only: 6 mas for a
+ * across), where they stay for long. Many objects, or one on a known orbit, show the offset; what
+ * cannot be separated stays in its variance. Stars show the offset by aberration only: 6 mas for a
  * second in low orbit.
  *
  * Extended Kalman filter; errors of positions follow random walks, so that they do not become

@@ -121,4 +121,7 @@ void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool u
         cue->unseen_density =
             (1.0 - p->detection_probability) / p->detection_probability * p->unknown_density;
     }
+    if (usable) {
+        bst_tracker_learn_clock(t, input, frame);
+    }
 }

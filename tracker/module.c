@@ -236,6 +236,31 @@ static bst_status widen_by_clock(tracker_module *m, struct bst_step *step, doubl
     return BST_OK;
 }
 
+/* Reads the cue at mid-exposure. */
+static bst_status read_cue(tracker_module *m, struct bst_step *step, double seconds,
+                           double clock_sigma_s, bst_tracker_cue *out) {
+    bst_ctx *ctx = bst_step_ctx(step);
+    bst_onboard_cue cue;
+    BST_TRY(bst_knowledge_cue_at(ctx, m->view, seconds, &cue));
+    if (clock_sigma_s > 0.0) {
+        BST_TRY(widen_by_clock(m, step, seconds, clock_sigma_s, &cue));
+    }
+    *out = (bst_tracker_cue){.valid = cue.valid,
+                             .direction_gcrf = cue.direction_gcrf,
+                             .rate_gcrf_radps = cue.rate_gcrf_radps,
+                             .sigma_rad = cue.sigma_rad,
+                             .rate_sigma_radps = cue.rate_sigma_radps,
+                             .v_mag = cue.v_mag,
+                             .v_mag_sigma = cue.v_mag_sigma};
+    BST_TRY(bst_knowledge_belt_eye_at(ctx, m->view, seconds, &out->in_region, &out->belt_eye));
+    if (m->orbits && bst_tracker_may_start_orbit(m->tracker)) {
+        bool known;
+        BST_TRY(bst_knowledge_cue_range_at(ctx, m->view, seconds, &known, &out->range_m,
+                                           &out->range_rate_mps));
+    }
+    return BST_OK;
+}
+
 /* Processes a detections message: tracker step, tracks and predictions. */
 static bst_status process_detections(tracker_module *m, struct bst_step *step,
                                      const bst_detections *detections) {
@@ -271,27 +296,9 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
     if (bst_knowledge_view_task(m->view, bst_step_latest(step, PORT_TASK).payload)) {
         bst_tracker_retarget(m->tracker);
     }
-    bst_onboard_cue cue;
-    BST_TRY(bst_knowledge_cue_at(bst_step_ctx(step), m->view, seconds, &cue));
     double clock_sigma_s =
         bst_tracker_clock_sigma_s(m->tracker, bst_knowledge_view_clock_s(m->view));
-    if (clock_sigma_s > 0.0) {
-        BST_TRY(widen_by_clock(m, step, seconds, clock_sigma_s, &cue));
-    }
-    input.cue = (bst_tracker_cue){.valid = cue.valid,
-                                  .direction_gcrf = cue.direction_gcrf,
-                                  .rate_gcrf_radps = cue.rate_gcrf_radps,
-                                  .sigma_rad = cue.sigma_rad,
-                                  .rate_sigma_radps = cue.rate_sigma_radps,
-                                  .v_mag = cue.v_mag,
-                                  .v_mag_sigma = cue.v_mag_sigma};
-    BST_TRY(bst_knowledge_belt_eye_at(bst_step_ctx(step), m->view, seconds, &input.cue.in_region,
-                                      &input.cue.belt_eye));
-    if (m->orbits && bst_tracker_may_start_orbit(m->tracker)) {
-        bool known;
-        BST_TRY(bst_knowledge_cue_range_at(bst_step_ctx(step), m->view, seconds, &known,
-                                           &input.cue.range_m, &input.cue.range_rate_mps));
-    }
+    BST_TRY(read_cue(m, step, seconds, clock_sigma_s, &input.cue));
     if (m->catalogue) {
         input.near = bst_tracker_catalogue_near;
         input.sight = bst_tracker_catalogue_sight;

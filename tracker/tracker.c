@@ -533,9 +533,6 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     if (t->identity && input->near) {
         bst_tracker_identify(t, input, attitude.usable, &frame, &view.cue);
     }
-    if (t->clock && input->sight && attitude.usable) {
-        bst_tracker_learn_clock(t, input, &frame);
-    }
     choose_target(t, &view.cue, seconds);
     smooth(t, &(bst_smoother_frame){d->exposure_id, tick, seconds, t->target.id});
     write_tracks(t, d, &attitude.fix, &view.cue, detections_lost, tracks, track_capacity);

@@ -127,7 +127,8 @@ bst_status bst_tracker_identity_create(bst_ctx *ctx, const bst_tracker_config *c
  *
  * Errors:    BST_ERR_FORMAT */
 bst_status bst_tracker_identity_archive(bst_tracker *t, bst_archive *archive) BST_MUST_CHECK;
-/* Compares the tracks with the catalogue, if it is time, and sets the cue's comparison.
+/* Compares the tracks with the catalogue, if it is time, sets the cue's comparison, and updates the
+ * clock's offset.
  *
  * Given:     usable  the frame has an attitude */
 void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool usable,

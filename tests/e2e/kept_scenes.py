@@ -124,7 +124,8 @@ def unlike():
                                         initial_attitude_error_deg=[0.2, -0.1, 0.3],
                                         star_trackers=[{"axis": [0.2, 1, -0.3], "noise_arcsec": 4},
                                                        {"axis": [1, -0.4, 0.5], "noise_arcsec": 2, "latency_s": 0.2}])}}
-    second["modules"]["tracker"] = {"type": "ukf", "association": "pda", "assumed_range_km": 36000}
+    second["modules"]["tracker"] = {"type": "ukf", "association": "pda", "assumed_range_km": 36000, "clock_sigma_s": 0.2,
+                                    "catalogue_sigma_m": 700, "catalogue_sigma_mps": 0.3, "navigation_sigma_m": 90}
     second["modules"]["control"].update(delay_s={"tracks": 0.1}, command_latency_s=0.08, exposure_s=0.7)
     second["modules"].pop("scenegen")
     scene["observers"][0]["sensors"].append(second)

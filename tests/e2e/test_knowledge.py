@@ -464,6 +464,41 @@ class CameraCalibration(unittest.TestCase):
         self.assertEqual(manifest["summary"]["final_mode"], "track")
 
 
+class Clock(unittest.TestCase):
+    """The onboard clock is 4 s ahead, 67 px of the cue of a geostationary satellite, and the tracker learns it
+    from that satellite."""
+
+    def test_the_offset_is_learned_and_taken_from_the_cue(self):
+        modules = "/observers/0/sensors/0/modules/"
+        follow = (runs.NO_FRAMES, runs.GENERATOR, modules + "control/strategy=rate",
+                  modules + "control/compensate_attitude=true", "/observers/0/sensors/0/cue/offset_deg=0",
+                  "/observers/0/sensors/0/knowledge/clock_offset_s=4", modules + "tracker/catalogue_sigma_m=100")
+        off = {}
+        for sigma_s in (0, 5):
+            out = os.path.join(runs.scratch(), f"clock_{sigma_s}")
+            runs.run(runs.TRACK, out, *follow, modules + f"tracker/clock_sigma_s={sigma_s}", duration=40)
+            db = runs.database(out)
+            off[sigma_s] = np.mean([np.hypot(x - CENTRE_PX, y - CENTRE_PX) for x, y in db.execute(
+                "SELECT x_start_px, y_start_px FROM truth WHERE norad = 44801 AND mid_s > 20")])
+            learned = db.execute("SELECT clock_offset_s, clock_sigma_s FROM track_frames WHERE time_s > 20").fetchall()
+            for offset_s, one_sigma_s in learned:
+                if sigma_s == 0:
+                    self.assertIsNone(offset_s)
+                else:
+                    self.assertLess(abs(offset_s - 4), 3 * one_sigma_s)
+                    self.assertLess(one_sigma_s, 0.02)  # 100 m over 7.5 km/s: 13 ms
+        self.assertGreater(off[0], 60)
+        self.assertLess(off[5], 1)
+
+    def test_it_needs_identities(self):
+        modules = "/observers/0/sensors/0/modules/"
+        result = subprocess.run(runs.command(
+            runs.TRACK, os.path.join(runs.scratch(), "clock_alone"), modules + "tracker/clock_sigma_s=1",
+            modules + "tracker/identity_period_s=0", duration=1), capture_output=True, text=True)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("clock_sigma_s (1) needs the identity of tracks", result.stderr)
+
+
 def setUpModule():
     warnings.simplefilter("ignore", FITSFixedWarning)
 

@@ -171,7 +171,7 @@ class Plugins(unittest.TestCase):
                 (f'{block}={{"plugin": "old.so"}}',
                  "old.so has a stage of interface 99, this program takes 2: build it with"),
                 (f'{control}={{"plugin": "aged.so"}}',
-                 "aged.so has a module of interface 2, this program takes 6: build it with"),
+                 "aged.so has a module of interface 2, this program takes 7: build it with"),
                 (f'{block}={{"plugin": "other.so"}}',
                  'of kind "telescope" .allowed: "detector", "compensator", "frame_stage"'),
                 (f'{block}={{"plugin": "leaky.so"}}',

@@ -351,7 +351,7 @@ static void calls_in_the_wrong_order_are_refused(void **state) {
     engine = fake_engine(&ctx, 1000);
     spec = FAKE_SPEC(old, "x", p, 1);
     assert_int_equal(bst_engine_add(&ctx, engine, &spec), BST_ERR_CONFIG);
-    assert_string_equal(ctx.message, "x: module fake/alone was built for interface 0, this is 6");
+    assert_string_equal(ctx.message, "x: module fake/alone was built for interface 0, this is 7");
     bst_engine_free(engine);
 }
 

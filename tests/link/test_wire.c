@@ -216,7 +216,7 @@ static void headers_are_read(void **state) {
     assert_int_equal(
         read_text("{ \"crcs\" : [ \"0000000a\" ] , \"mine\":{\"a\":[1,{}],\"b\":\"}\"}, "
                   "\"lengths\":[16],\n\"sequence\":0,\"tick\":0, \"flag\":true,"
-                  "\"type\":\"done\",\"version\":8, ",
+                  "\"type\":\"done\",\"version\":9, ",
                   &out),
         BST_WIRE_GOOD);
     assert_int_equal(out.crcs[0], 10);
@@ -236,36 +236,36 @@ static void wrong_headers_are_refused(void **state) {
          BST_WIRE_BAD_VERSION},
         {"{\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":[\"00000000\"],",
          BST_WIRE_BAD_VERSION},
-        {"{\"version\":8,\"type\":\"dance\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":9,\"type\":\"dance\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_UNEXPECTED},
-        {"{\"version\":8,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16,3],\"crcs\":["
+        {"{\"version\":9,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16,3],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_LENGTH},
-        {"{\"version\":8,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":[],",
+        {"{\"version\":9,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":[],",
          BST_WIRE_BAD_LENGTH},
-        {"{\"version\":8,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[1,2,3],\"crcs\":["
+        {"{\"version\":9,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[1,2,3],\"crcs\":["
          "],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":8,\"type\":\"done\",\"tick\":0,\"sequence\":-1,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":9,\"type\":\"done\",\"tick\":0,\"sequence\":-1,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":8,\"type\":\"done\",\"tick\":0.5,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":9,\"type\":\"done\",\"tick\":0.5,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":8,\"type\":\"done\",\"tick\":1e3,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":9,\"type\":\"done\",\"tick\":1e3,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":8,\"type\":\"done\",\"tick\":9999999999999999,\"sequence\":0,\"lengths\":["
+        {"{\"version\":9,\"type\":\"done\",\"tick\":9999999999999999,\"sequence\":0,\"lengths\":["
          "16],\"crcs\":[\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":8,\"version\":8,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16]"
+        {"{\"version\":9,\"version\":9,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16]"
          ",\"crcs\":[\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":8,\"type\":\"do\\u006ee\",\"tick\":0,\"sequence\":0,\"lengths\":[16],"
+        {"{\"version\":9,\"type\":\"do\\u006ee\",\"tick\":0,\"sequence\":0,\"lengths\":[16],"
          "\"crcs\":[\"00000000\"],",
          BST_WIRE_BAD_HEADER},
-        {"{\"version\":8,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
+        {"{\"version\":9,\"type\":\"done\",\"tick\":0,\"sequence\":0,\"lengths\":[16],\"crcs\":["
          "\"0000000A\"],",
          BST_WIRE_BAD_HEADER},
         {"[1,", BST_WIRE_BAD_HEADER},
@@ -343,7 +343,7 @@ static void layouts_are_those_of_the_version(void **state) {
     const struct {
         int version;
         uint64_t digest;
-    } known = {8, UINT64_C(0xf18d29d6c9ec4623)};
+    } known = {9, UINT64_C(0x372395ae0fb9748a)};
     uint64_t h = BST_FNV_START;
     for (int t = 0; t < BST_LINK_TYPES; t++) {
         const bst_wire_message *m = bst_wire_message_of((bst_link_type)t);

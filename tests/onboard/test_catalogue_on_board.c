@@ -148,7 +148,7 @@ static void the_objects_nearest_to_tracks(void **state) {
     bst_assert_ok(
         &s.ctx, bst_tracker_catalogue_create(&s.ctx, &config, s.knowledge, s.onboard, &catalogue));
     const double t = 37.0;
-    assert_int_equal(bst_tracker_catalogue_set(catalogue, t), -1);
+    assert_int_equal(bst_tracker_catalogue_set(catalogue, t, 0.0), -1);
     static const int both[2] = {OBJECT_GX5, BESIDE_GX5};
     bst_world_sight at[2];
     for (int i = 0; i < 2; i++) {
@@ -168,6 +168,35 @@ static void the_objects_nearest_to_tracks(void **state) {
         assert_int_equal(found[0].object, both[i % 2]);
     }
     assert_false(bst_tracker_catalogue_failed(catalogue));
+    /* a clock known to 50 s: the rate times that, and the change of the rate, are added */
+    int left_out;
+    bst_identity_object right, wide;
+    const bst_tracker_search search = {.axis = at[0].geometric,
+                                       .half_angle_rad = 1e-3,
+                                       .tracks = &at[0].geometric,
+                                       .track_count = 1};
+    bst_tracker_catalogue_near(catalogue, &search, &right, 1, &left_out);
+    bst_assert_close(right.sigma_rad, config.catalogue_sigma_m / at[0].range_m, 1e-12);
+    bst_tracker_catalogue_set(catalogue, t, 50.0);
+    bst_tracker_catalogue_near(catalogue, &search, &wide, 1, &left_out);
+    bst_assert_close(wide.sigma_rad, hypot(right.sigma_rad, 50.0 * bst_vec3_norm(right.rate_radps)),
+                     1e-12);
+    bst_vec3 rate[2];
+    for (int i = 0; i < 2; i++) {
+        bst_tracker_catalogue_set(catalogue, t - 1.0 + 2.0 * i, 0.0);
+        bst_identity_object o;
+        bst_tracker_catalogue_near(catalogue, &search, &o, 1, &left_out);
+        rate[i] = o.rate_radps;
+    }
+    double turn = 0.5 * test_distance(rate[0], rate[1]);
+    bst_assert_close(wide.rate_sigma_radps, hypot(right.rate_sigma_radps, 50.0 * turn),
+                     0.02 * wide.rate_sigma_radps); /* places are interpolated */
+    assert_true(wide.rate_sigma_radps > 2.0 * right.rate_sigma_radps);
+    bst_clock_sight sight;
+    bst_tracker_catalogue_set(catalogue, t, 0.0);
+    assert_true(bst_tracker_catalogue_sight(catalogue, OBJECT_GX5, &sight));
+    bst_assert_close(test_distance(sight.direction, at[0].geometric), 0, 1e-15);
+    bst_assert_close(sight.corrected_s, 0.0, 0.0);
     bst_tracker_catalogue_free(catalogue);
     drop(&s);
 }

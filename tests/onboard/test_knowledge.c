@@ -129,6 +129,31 @@ static void a_clock_offset_shifts_the_cue_by_its_rate(void **state) {
     drop(&right);
 }
 
+/* The offset that is set is taken from the clock: an estimate that is right gives the cue of a
+ * right clock, and one within a third of its sigma of that in use changes nothing. */
+static void an_estimated_clock_offset_corrects_the_cue(void **state) {
+    (void)state;
+    scene right = make(""), s = make("\"clock_offset_s\": 1");
+    bst_onboard_cue wrong = cue_at(&s, 60);
+    assert_true(bst_knowledge_view_set_clock(s.kview, 1.0, 0.1));
+    bst_onboard_cue now = cue_at(&s, 60), expected = cue_at(&right, 60);
+    assert_true(test_distance(wrong.direction_gcrf, expected.direction_gcrf) > 1e-5);
+    bst_assert_close(test_distance(now.direction_gcrf, expected.direction_gcrf), 0, 1e-15);
+    bst_assert_close(test_distance(now.rate_gcrf_radps, expected.rate_gcrf_radps), 0, 1e-15);
+    assert_false(bst_knowledge_view_set_clock(s.kview, 1.03, 0.1));
+    bst_assert_close(bst_knowledge_view_clock_s(s.kview), 1.0, 0.0);
+    assert_true(bst_knowledge_view_set_clock(s.kview, 1.04, 0.1));
+    bst_onboard_line line;
+    bst_world_sight sight;
+    bst_assert_ok(&s.ctx, bst_knowledge_line_at(&s.ctx, s.kview, 0, 60, &line));
+    bst_assert_ok(&s.ctx, bst_knowledge_sight_at(&s.ctx, s.kview, 0, 60, &sight));
+    bst_assert_close(test_distance(line.direction, sight.geometric), 0, 1e-15);
+    bst_vec3 between = bst_vec3_sub(line.object.position_m, line.eye.position_m);
+    bst_assert_close(bst_vec3_norm(between), sight.range_m, 1e-6);
+    drop(&s);
+    drop(&right);
+}
+
 /* The spacecraft starts with +z where the onboard side reckons the cue, its errors in it. */
 static void the_start_follows_what_is_believed(void **state) {
     (void)state;
@@ -371,6 +396,7 @@ int main(void) {
         cmocka_unit_test(the_truth_by_default),
         cmocka_unit_test(an_orbit_error_moves_the_cue_by_the_parallax),
         cmocka_unit_test(a_clock_offset_shifts_the_cue_by_its_rate),
+        cmocka_unit_test(an_estimated_clock_offset_corrects_the_cue),
         cmocka_unit_test(the_start_follows_what_is_believed),
         cmocka_unit_test(a_velocity_error_is_aberration),
         cmocka_unit_test(the_onboard_psf_is_a_gaussian),

@@ -102,7 +102,7 @@ static bst_tracker_catalogue *create(bst_ctx *ctx) {
     bst_assert_ok(
         ctx, bst_tracker_catalogue_create(ctx, &config, (const bst_knowledge *)(void *)&nothing,
                                           (bst_knowledge_view *)(void *)&nothing, &c));
-    assert_int_equal(bst_tracker_catalogue_set(c, NOW_S), CUE);
+    assert_int_equal(bst_tracker_catalogue_set(c, NOW_S, 0.0), CUE);
     return c;
 }
 
@@ -138,7 +138,7 @@ static void what_is_in_the_cone(void **state) {
     assert_true(asked_s == NOW_S && asked_half_rad == search.half_angle_rad);
     bst_assert_close(asked_axis_off, 0.0, 1e-15);
     assert_false(bst_tracker_catalogue_failed(c));
-    assert_int_equal(bst_tracker_catalogue_set(c, -1.0), CUE);
+    assert_int_equal(bst_tracker_catalogue_set(c, -1.0, 0.0), CUE);
     assert_int_equal(bst_tracker_catalogue_near(c, &search, out, 3, &left_out), -1);
     assert_true(bst_tracker_catalogue_failed(c));
     bst_tracker_catalogue_free(c);

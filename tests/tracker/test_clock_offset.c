@@ -1,5 +1,5 @@
 /* Offset of the onboard clock: closed forms, the distribution of its error in random passes whose
- * orbits and positions have the stated errors, and geometries that tell nothing. */
+ * orbits and positions have the stated errors, and geometries that show nothing. */
 #include "boresight/rng.h"
 #include "sim/astro/bodies.h"
 #include "tests/test_support.h"
@@ -201,7 +201,7 @@ static void stated_variance_is_that_of_the_error(void **state) {
 }
 
 /* A neighbour on the same orbit hardly moves: the offset stays unknown, however long it is seen. */
-static void what_does_not_move_tells_nothing(void **state) {
+static void what_does_not_move_shows_nothing(void **state) {
     (void)state;
     const bst_clock_params p = {0.5, 1000.0, 0.5, 10.0};
     const orbit next = {42.164e6, 0.01, 0.2, 0.61};
@@ -216,7 +216,7 @@ static void what_does_not_move_tells_nothing(void **state) {
 }
 
 /* A day at one measurement a second: the covariance stays positive, and long tracking makes the
- * error of an object's orbit no smaller than what the geometry tells. */
+ * error of an object's orbit no smaller than what the geometry shows. */
 static void covariance_stays_positive_for_a_day(void **state) {
     (void)state;
     const bst_clock_params p = {2.0, 50.0, 0.01, 10.0};
@@ -276,7 +276,7 @@ int main(void) {
         cmocka_unit_test(one_measurement_is_a_weighted_mean),
         cmocka_unit_test(covariance_of_a_measurement_counts_whole),
         cmocka_unit_test(stated_variance_is_that_of_the_error),
-        cmocka_unit_test(what_does_not_move_tells_nothing),
+        cmocka_unit_test(what_does_not_move_shows_nothing),
         cmocka_unit_test(covariance_stays_positive_for_a_day),
         cmocka_unit_test(degenerate_sights_are_not_used),
     };

@@ -5,7 +5,7 @@ from typing import Any, Dict, List
 
 import numpy as np
 
-VERSION = 8
+VERSION = 9
 
 # Members of each message's record, then of its items: name:type, x for an array. A test compares
 # them with docs/reference/icd.md.

@@ -425,13 +425,10 @@ bst_status bst_recorder_track_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     put_flag(&r, a->valid);
     put_int(&r, a->stars);
     put_quat(&r, a->valid ? a->q_cam_from_gcrf : no_quat);
-    put_vector(&r, bst_vec3_scale(a->error_cam_rad, a->valid ? ARCSEC : NAN));
-    for (int i = 0; i < 3; i++) {
-        put_real(&r, a->sigma_rad[i] * (a->valid ? ARCSEC : NAN));
-    }
-    for (int i = 0; i < 3; i++) {
-        put_real(&r, a->valid ? a->correlation[i] : NAN);
-    }
+    const double *sigma = a->sigma_rad, *c = a->correlation, arcsec = a->valid ? ARCSEC : NAN;
+    put_vector(&r, bst_vec3_scale(a->error_cam_rad, arcsec));
+    put_vector(&r, bst_vec3_scale((bst_vec3){sigma[0], sigma[1], sigma[2]}, arcsec));
+    put_vector(&r, bst_vec3_scale((bst_vec3){c[0], c[1], c[2]}, a->valid ? 1.0 : NAN));
     put_real(&r, a->valid ? a->rms_px : NAN);
     put_real(&r, a->valid ? a->shared : NAN);
     put_real(&r, t->clock_sigma_s > 0.0 ? t->clock_offset_s : NAN);
