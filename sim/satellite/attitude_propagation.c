@@ -6,9 +6,11 @@
 
 #include "sim/satellite/tumbling.h"
 
-#define LONGEST_S 120.0    /* an orbit at the lowest height takes 5,300 s */
-#define LONGEST_RAD 1.0    /* of rotation in a step */
-#define SHORTEST 1e-4      /* shortest over longest step */
+#define LONGEST_S 120.0 /* an orbit at the lowest height takes 5,300 s */
+#define LONGEST_RAD 1.0 /* of rotation in a step */
+#define SHORTEST 1e-5   /* shortest over longest step */
+#define ROUNDING 1e-14  /* of attitude and rate in some hundred operations, relative */
+#define DAY_S 86400.0
 #define TURN_STEP_RAD 5e-3 /* Runge-Kutta: h^5 / 120 a step, 5e-12 rad a radian */
 #define READ_STEP_RAD 0.02 /* between nodes: 1e-9 rad over half a step */
 
@@ -33,8 +35,9 @@ struct bst_attitude_propagation {
     void *user;
     node *nodes; /* [count], the last one without end */
     int64_t count, room, calls;
-    double next_s; /* length of the next step to try */
-    bool ended;    /* the torque is unknown after the last node */
+    double next_s;      /* length of the next step to try */
+    bst_vec3 torque_nm; /* at the last node, once there is more than one */
+    bool ended;         /* the torque is unknown after the last node */
 };
 
 bst_status bst_attitude_propagation_create(bst_ctx *ctx, const bst_attitude_motion *start,
@@ -81,30 +84,36 @@ static void turn(const bst_attitude_propagation *p, double seconds, double step_
     bst_tumbling_turn(p->inertia, seconds, step_rad, &m->q, &m->w);
 }
 
-static bool kick(bst_attitude_propagation *p, double at_s, double seconds, motion *m) {
-    bst_vec3 n;
+/* Torque at a time, N m; false: unknown. */
+static bool torque_at(bst_attitude_propagation *p, double at_s, bst_quat q, bst_vec3 *out) {
     p->calls++;
-    if (!p->torque(p->user, at_s, m->q, &n)) {
-        return false;
-    }
-    const double *i = p->inertia;
-    m->w = bst_vec3_axpy(m->w, seconds, (bst_vec3){n.x / i[0], n.y / i[1], n.z / i[2]});
-    return true;
+    return p->torque(p->user, at_s, q, out) && isfinite(bst_vec3_norm(*out));
 }
 
-/* Motion over h_s with impulses at the nodes of Gauss-Legendre quadrature; false: torque
- * unknown. */
-static bool move(bst_attitude_propagation *p, double at_s, double h_s, motion *m) {
-    const double first = (0.5 - sqrt(3.0) / 6.0) * h_s, between = h_s / sqrt(3.0);
-    turn(p, first, TURN_STEP_RAD, m);
-    if (!kick(p, at_s + first, 0.5 * h_s, m)) {
+/* Change of the rate by a torque over some seconds. */
+static void kick(const bst_attitude_propagation *p, bst_vec3 torque, double seconds, motion *m) {
+    const double *i = p->inertia;
+    m->w =
+        bst_vec3_axpy(m->w, seconds, (bst_vec3){torque.x / i[0], torque.y / i[1], torque.z / i[2]});
+}
+
+/* Motion over h_s with impulses at start, middle and end; false: torque unknown.
+ *
+ * Given:     *torque_nm  at the start
+ * Returned:  *torque_nm  at the end */
+static bool move(bst_attitude_propagation *p, double at_s, double h_s, bst_vec3 *torque_nm,
+                 motion *m) {
+    kick(p, *torque_nm, h_s / 6.0, m);
+    turn(p, 0.5 * h_s, TURN_STEP_RAD, m);
+    if (!torque_at(p, at_s + 0.5 * h_s, m->q, torque_nm)) {
         return false;
     }
-    turn(p, between, TURN_STEP_RAD, m);
-    if (!kick(p, at_s + first + between, 0.5 * h_s, m)) {
+    kick(p, *torque_nm, h_s * 2.0 / 3.0, m);
+    turn(p, 0.5 * h_s, TURN_STEP_RAD, m);
+    if (!torque_at(p, at_s + h_s, m->q, torque_nm)) {
         return false;
     }
-    turn(p, first, TURN_STEP_RAD, m);
+    kick(p, *torque_nm, h_s / 6.0, m);
     return true;
 }
 
@@ -132,32 +141,40 @@ static void extend(bst_attitude_propagation *p) {
         p->nodes = more ? more : p->nodes;
         p->room *= more ? 2 : 1;
     }
+    if (p->count == 1) {
+        p->ended = !torque_at(p, p->nodes[0].at_s, p->nodes[0].m.q, &p->torque_nm);
+    }
     while (!p->ended) {
         const node *from = &p->nodes[p->count - 1];
         double longest = fmin(LONGEST_S, LONGEST_RAD / fmax(bst_vec3_norm(from->m.w), 1e-9));
         double h = fmin(p->next_s, longest), error = 0.0;
         motion once = from->m, half = from->m;
-        bool known = move(p, from->at_s, h, &once) && move(p, from->at_s, 0.5 * h, &half);
+        bst_vec3 torque = p->torque_nm, of_half = torque;
+        bool known =
+            move(p, from->at_s, h, &torque, &once) && move(p, from->at_s, 0.5 * h, &of_half, &half);
         motion end = half;
-        known = known && move(p, from->at_s + 0.5 * h, 0.5 * h, &end);
+        known = known && move(p, from->at_s + 0.5 * h, 0.5 * h, &of_half, &end);
         bst_vec3 dq = {0.0, 0.0, 0.0}, dw = dq;
         if (known) {
             dq = bst_quat_to_rotvec(bst_quat_mul(end.q, bst_quat_conj(once.q)));
             dw = bst_vec3_sub(end.w, once.w);
-            error = (bst_vec3_norm(dq) + BST_ATTITUDE_RATE_ERROR_S * bst_vec3_norm(dw)) / 3.0;
+            error = (bst_vec3_norm(dq) + DAY_S * bst_vec3_norm(dw)) / 3.0;
             known = isfinite(error);
         }
         error = known ? error : (double)INFINITY;
-        /* the error of a step grows with its third to fifth power */
-        double factor = 0.9 * sqrt(sqrt(p->tolerance_rad / fmax(error, 1e-30)));
+        /* the error of a step over its length grows with its second to fourth power */
+        double rounding = ROUNDING * (1.0 + DAY_S * bst_vec3_norm(from->m.w));
+        double allowed = fmax(p->tolerance_rad * h / DAY_S, rounding);
+        double factor = 0.9 * cbrt(allowed / fmax(error, 1e-30));
         p->next_s = fmax(h * fmin(fmax(factor, 0.2), 3.0), SHORTEST * longest);
         bool shortest = h <= SHORTEST * longest * (1.0 + 1e-9);
-        if (known && (error <= p->tolerance_rad || shortest)) {
+        if (known && (error <= allowed || shortest)) {
             end.q = bst_quat_unit(
                 bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(dq, 1.0 / 3.0)), end.q));
             end.w = bst_vec3_axpy(end.w, 1.0 / 3.0, dw);
             append(p, 0.5 * h, &half);
             append(p, 0.5 * h, &end);
+            p->ended = !torque_at(p, p->nodes[p->count - 1].at_s, end.q, &p->torque_nm);
             return;
         }
         p->ended = shortest;

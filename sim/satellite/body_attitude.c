@@ -19,9 +19,8 @@ static const bst_config_desc torques_table[] = {
              "Earth."),
     BST_BOOL(T, drag, "false",
              "Air on the facets, with the orbit's spacecraft.cd and forces.density_scale."),
-    BST_REAL(T, tolerance_rad, "rad", 1e-12, 1e-2, "1e-7",
-             "Estimated error of the integrator's steps: of the attitude, plus that of the rate "
-             "over 600 s."),
+    BST_REAL(T, tolerance_rad, "rad", 1e-6, 1, "1e-3",
+             "Estimated error of the attitude after a day, by which steps are chosen."),
     BST_CONFIG_END};
 #undef T
 
