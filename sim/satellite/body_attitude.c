@@ -19,7 +19,7 @@ static const bst_config_desc torques_table[] = {
              "Earth."),
     BST_BOOL(T, drag, "false",
              "Air on the facets, with the orbit's spacecraft.cd and forces.density_scale."),
-    BST_REAL(T, tolerance_rad, "rad", 1e-6, 1, "1e-3",
+    BST_REAL(T, tolerance_rad, "rad", 1e-6, 1, "1e-2",
              "Estimated error of the attitude after a day, by which steps are chosen."),
     BST_CONFIG_END};
 #undef T
