@@ -6,7 +6,7 @@
 #include "sim/satellite/attitude_propagation.h"
 #include "sim/satellite/tumbling.h"
 
-#define EARLIEST_S -1e8 /* start of torques: three years before the epoch */
+#define EARLIEST_S -1e7 /* start of torques: four months before the epoch */
 
 static const char *const laws[] = {"nadir", "nadir_sun", "velocity", "sun", "inertial",
                                    "spin",  "tumble",    "table",    NULL};

@@ -217,8 +217,7 @@ static void a_windmill_spins_up(void **state) {
 }
 
 /* A phase that continues starts from the attitude before, and its torques from there on; forces and
- * torques of one shape go together, and the orbit of the torques is within what sunlight changes.
- */
+ * torques of one shape go together. */
 static void phases_continue(void **state) {
     (void)state;
     bst_world *world = test_world_with(
