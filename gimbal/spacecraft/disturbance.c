@@ -2,6 +2,7 @@
 
 #include "sim/astro/bodies.h"
 #include "sim/astro/forces.h"
+#include "sim/astro/gravity.h"
 
 #define C bst_disturbance_config
 const bst_config_desc bst_disturbance_config_table[] = {
@@ -32,14 +33,6 @@ const bst_config_desc bst_disturbance_config_table[] = {
     BST_REAL(C, cd, "", 0, 10, "2.2", "shape_file: drag coefficient."),
     BST_CONFIG_END};
 #undef C
-
-bst_vec3 bst_spacecraft_gravity_gradient_torque(const bst_mat3 *inertia_kgm2,
-                                                bst_quat q_body_from_gcrf, bst_vec3 position_m) {
-    double r2 = bst_vec3_dot(position_m, position_m);
-    bst_vec3 r = bst_quat_rotate(q_body_from_gcrf, position_m);
-    return bst_vec3_scale(bst_vec3_cross(r, bst_mat3_mul_vec(inertia_kgm2, r)),
-                          3.0 * BST_EARTH_MU_M3PS2 / (r2 * r2 * sqrt(r2)));
-}
 
 bst_vec3 bst_spacecraft_solar_torque(const bst_disturbance_config *config,
                                      bst_quat q_body_from_gcrf, bst_vec3 sun_m, double sunlit) {
@@ -74,8 +67,8 @@ bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_
                                 double sunlit, bst_vec3 wheel_momentum_nms) {
     bst_vec3 sum = bst_vec3_from_array(config->constant_torque_nm);
     if (config->gravity_gradient) {
-        sum = bst_vec3_add(sum, bst_spacecraft_gravity_gradient_torque(
-                                    inertia_kgm2, q_body_from_gcrf, position_m));
+        sum = bst_vec3_add(sum,
+                           bst_gravity_gradient_torque(inertia_kgm2, q_body_from_gcrf, position_m));
     }
     if (config->srp_area_m2 > 0.0 && sunlit > 0.0) {
         sum =

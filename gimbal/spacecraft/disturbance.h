@@ -21,12 +21,6 @@ typedef struct bst_disturbance_config {
 
 extern const bst_config_desc bst_disturbance_config_table[];
 
-/* Gravity-gradient torque of a point-mass Earth: 3 mu / r^3 (u x I u), u the unit vector to the
- * Earth's centre. Markley and Crassidis, Fundamentals of Spacecraft Attitude Determination and
- * Control (2014), eq. 3.155. */
-bst_vec3 bst_spacecraft_gravity_gradient_torque(const bst_mat3 *inertia_kgm2,
-                                                bst_quat q_body_from_gcrf, bst_vec3 position_m);
-
 /* Solar radiation torque: force P (1 au / d)^2 A C away from the Sun, at `lever` from the centre of
  * mass.
  *

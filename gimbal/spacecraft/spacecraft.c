@@ -522,9 +522,13 @@ static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double
                                                    body->q_body_from_gcrf, craft->sky.position_m,
                                                    craft->sky.sun_m, craft->sky.sunlit, momentum);
     if (craft->surface) {
-        const bst_surface_state state = {body->q_body_from_gcrf,  craft->sky.position_m,
-                                         craft->sky.velocity_mps, craft->sky.sun_m,
-                                         craft->sky.sunlit,       seconds};
+        const bst_surface_state state = {body->q_body_from_gcrf,
+                                         craft->sky.position_m,
+                                         craft->sky.velocity_mps,
+                                         craft->sky.sun_m,
+                                         craft->sky.sunlit,
+                                         seconds,
+                                         1.0};
         craft->disturbance_nm =
             bst_vec3_add(craft->disturbance_nm, bst_surface_torque_at(craft->surface, &state));
     }

@@ -1,5 +1,6 @@
 #include <stdlib.h>
 
+#include "sim/astro/bodies.h"
 #include "sim/astro/gravity_internal.h"
 
 /* The solid harmonics of degree n, order m, V and W (Montenbruck and Gill 3.29), normalised, follow
@@ -167,4 +168,12 @@ double bst_gravity_potential(const bst_gravity *g, bst_vec3 p) {
     double r2 = bst_vec3_dot(p, p);
     double u = g->terms ? walk(g, p, r2, NULL) : 0.0;
     return g->gm / sqrt(r2) + g->gm / g->radius * u;
+}
+
+bst_vec3 bst_gravity_gradient_torque(const bst_mat3 *inertia_kgm2, bst_quat q_body_from_gcrf,
+                                     bst_vec3 position_m) {
+    double r2 = bst_vec3_dot(position_m, position_m);
+    bst_vec3 r = bst_quat_rotate(q_body_from_gcrf, position_m);
+    return bst_vec3_scale(bst_vec3_cross(r, bst_mat3_mul_vec(inertia_kgm2, r)),
+                          3.0 * BST_EARTH_MU_M3PS2 / (r2 * r2 * sqrt(r2)));
 }

@@ -58,4 +58,14 @@ bst_vec3 bst_gravity_acceleration(const bst_gravity *gravity, bst_vec3 position_
 /* Gravitational potential (m^2/s^2, positive near the Earth: its gradient is the acceleration). */
 double bst_gravity_potential(const bst_gravity *gravity, bst_vec3 position_itrf_m);
 
+/* Torque of the gravity gradient of a point-mass Earth on a body, N m, body axes: 3 mu / r^3
+ * (u x I u), u the unit vector to the Earth's centre.
+ *
+ * Given:     inertia_kgm2  about the centre of mass, body axes
+ *            position_m    geocentric, GCRF
+ * Reference: Markley and Crassidis, Fundamentals of Spacecraft Attitude Determination and Control
+ *            (2014), eq. 3.155 */
+bst_vec3 bst_gravity_gradient_torque(const bst_mat3 *inertia_kgm2, bst_quat q_body_from_gcrf,
+                                     bst_vec3 position_m);
+
 #endif

@@ -3,10 +3,26 @@
 #include <assert.h>
 #include <stdlib.h>
 
+#include "sim/satellite/attitude_propagation.h"
 #include "sim/satellite/tumbling.h"
+
+#define EARLIEST_S -1e7 /* start of torques: four months before the epoch */
 
 static const char *const laws[] = {"nadir", "nadir_sun", "velocity", "sun", "inertial",
                                    "spin",  "tumble",    "table",    NULL};
+
+#define T bst_attitude_torques
+static const bst_config_desc torques_table[] = {
+    BST_BOOL(T, gravity_gradient, "false", "The Earth's gravity gradient."),
+    BST_BOOL(T, solar_pressure, "false",
+             "Sunlight on the facets of the shape, with shadows between parts and that of the "
+             "Earth."),
+    BST_BOOL(T, drag, "false",
+             "Air on the facets, with the orbit's spacecraft.cd and forces.density_scale."),
+    BST_REAL(T, tolerance_rad, "rad", 1e-6, 1, "1e-2",
+             "Estimated error of the attitude after a day, by which steps are chosen."),
+    BST_CONFIG_END};
+#undef T
 
 const bst_config_desc bst_attitude_config_table[] = {
     BST_REAL(bst_attitude_config, from_s, "s", -1e9, 1e9, "-1e9",
@@ -15,7 +31,8 @@ const bst_config_desc bst_attitude_config_table[] = {
         bst_attitude_config, law, laws, "\"nadir\"",
         "nadir: z to the Earth's centre, x forward; nadir_sun: z to the Earth's centre, the "
         "Sun on the side of +x; velocity: x forward; sun: z to the Sun; inertial: fixed; spin: "
-        "constant rate; tumble: free rotation of a rigid body; table: from a file."),
+        "constant rate; tumble: rotation of a rigid body, free or under torques; table: from a "
+        "file."),
     BST_REALS(bst_attitude_config, rotation_deg, "deg", -360, 360, "[0, 0, 0]",
               "nadir, nadir_sun, velocity, sun: rotation of the body from there about its x, then "
               "y, then z axis."),
@@ -26,6 +43,9 @@ const bst_config_desc bst_attitude_config_table[] = {
               "spin, tumble: angular velocity at from_s in the body frame."),
     BST_REALS(bst_attitude_config, inertia_kg_m2, "kg m2", 0, 1e12, "[1, 1, 1]",
               "tumble: principal moments of inertia about the body's axes."),
+    BST_OBJECT(bst_attitude_config, torques, torques_table, "{}",
+               "tumble: torques about the centre of mass, the origin of the shape, from from_s on; "
+               "without any, the rotation is free."),
     BST_PATH(bst_attitude_config, file, "\"\"",
              "table: file of attitudes, relative to the scenario's folder: CSV with columns "
              "time_s, qx, qy, qz, qw (from GCRF to the body), a CCSDS AEM, or the "
@@ -40,8 +60,11 @@ typedef struct phase {
     bst_attitude_config config;
     bst_quat offset; /* body from the law's axes */
     bst_quat start;
-    bool continues; /* start is not yet known */
-    bst_tumbling *tumbling;
+    bool continues;                        /* start is not yet known */
+    bst_tumbling *tumbling;                /* NULL: another law, or torques */
+    bst_attitude_propagation *propagation; /* NULL: no torques */
+    bst_body_torque_fn torque;
+    void *user;
     bst_attitude_row *rows;
     int row_count;
 } phase;
@@ -55,6 +78,7 @@ struct bst_body_attitude {
 void bst_body_attitude_free(bst_body_attitude *a) {
     for (int i = 0; a && i < a->count; i++) {
         bst_tumbling_free(a->phases[i].tumbling);
+        bst_attitude_propagation_free(a->phases[i].propagation);
         free(a->phases[i].rows);
     }
     if (a) {
@@ -82,6 +106,28 @@ static bst_status load_rows(bst_ctx *ctx, const bst_attitude_source *source, pha
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "file");
 }
 
+static bool has_torques(const bst_attitude_config *c) {
+    return c->torques.gravity_gradient || c->torques.solar_pressure || c->torques.drag;
+}
+
+/* Checks the keys of a phase with torques. */
+static bst_status check_torques(bst_ctx *ctx, const bst_attitude_config *c) {
+    if (c->law != BST_ATTITUDE_TUMBLE) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "torques: found with the law %s (allowed: with tumble; other laws prescribe "
+            "the attitude)",
+            laws[c->law]);
+    }
+    if (c->from_s < EARLIEST_S) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "from_s: found %g with torques, which are integrated from there on "
+                        "(allowed: at least %g, such as 0)",
+                        c->from_s, EARLIEST_S);
+    }
+    return bst_tumbling_check(ctx, c->inertia_kg_m2);
+}
+
 static bst_status make_phase(bst_ctx *ctx, const bst_attitude_config *config, bool first,
                              const bst_attitude_source *source, phase *p) {
     const double *q = config->quaternion;
@@ -98,6 +144,9 @@ static bst_status make_phase(bst_ctx *ctx, const bst_attitude_config *config, bo
     p->continues = moves && !(norm > 0.0) && !first;
     if (config->law == BST_ATTITUDE_TABLE) {
         return load_rows(ctx, source, p);
+    }
+    if (has_torques(config)) {
+        return check_torques(ctx, config);
     }
     if (config->law == BST_ATTITUDE_TUMBLE) {
         bst_vec3 rate =
@@ -159,7 +208,9 @@ static bst_quat phase_at(const phase *p, const bst_attitude_state *s) {
         case BST_ATTITUDE_SPIN:
             return bst_quat_turn_frame(p->start, bst_vec3_scale(rate, since));
         case BST_ATTITUDE_TUMBLE:
-            return bst_quat_mul(bst_tumbling_at(p->tumbling, since, NULL), p->start);
+            return p->propagation
+                       ? bst_attitude_propagation_at(p->propagation, s->seconds, NULL)
+                       : bst_quat_mul(bst_tumbling_at(p->tumbling, since, NULL), p->start);
         case BST_ATTITUDE_INERTIAL:
             return p->start;
         case BST_ATTITUDE_TABLE:
@@ -178,6 +229,43 @@ static bst_quat phase_at(const phase *p, const bst_attitude_state *s) {
             break;
     }
     return bst_quat_mul(p->offset, law);
+}
+
+bool bst_body_attitude_has_torques(const bst_body_attitude *a) {
+    for (int i = 0; i < a->count; i++) {
+        if (has_torques(&a->phases[i].config)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool phase_torque(void *user, double seconds, bst_quat q, bst_vec3 *torque_nm) {
+    const phase *p = user;
+    return p->torque(p->user, &p->config, seconds, q, torque_nm);
+}
+
+bst_status bst_body_attitude_set_torque(bst_ctx *ctx, bst_body_attitude *a,
+                                        bst_body_torque_fn torque, void *user) {
+    for (int i = 0; i < a->count; i++) {
+        phase *p = &a->phases[i];
+        const bst_attitude_config *c = &p->config;
+        if (!has_torques(c)) {
+            continue;
+        }
+        bst_attitude_motion start = {
+            .start_s = c->from_s,
+            .q_body_from_gcrf = p->start,
+            .rate_radps = bst_vec3_scale(bst_vec3_from_array(c->rate_body_deg_per_s), BST_DEG_RAD)};
+        for (int k = 0; k < 3; k++) {
+            start.inertia_kg_m2[k] = c->inertia_kg_m2[k];
+        }
+        p->torque = torque;
+        p->user = user;
+        BST_TRY(bst_attitude_propagation_create(ctx, &start, c->torques.tolerance_rad, phase_torque,
+                                                p, &p->propagation));
+    }
+    return BST_OK;
 }
 
 static const phase *phase_for(const bst_body_attitude *a, double seconds) {
@@ -203,6 +291,9 @@ void bst_body_attitude_start(bst_body_attitude *a, int index, const bst_attitude
     assert(index > 0 && index < a->count);
     a->phases[index].start = phase_at(&a->phases[index - 1], state);
     a->phases[index].continues = false;
+    if (a->phases[index].propagation) {
+        bst_attitude_propagation_start(a->phases[index].propagation, a->phases[index].start);
+    }
 }
 
 bst_quat bst_body_attitude_at(const bst_body_attitude *a, const bst_attitude_state *state) {
@@ -233,6 +324,11 @@ double bst_body_attitude_rate_radps(const bst_body_attitude *a, double seconds) 
     }
     bool turns = p->config.law == BST_ATTITUDE_SPIN || p->config.law == BST_ATTITUDE_TUMBLE;
     double rate = bst_vec3_norm(bst_vec3_from_array(p->config.rate_body_deg_per_s)) * BST_DEG_RAD;
+    if (p->propagation) {
+        bst_vec3 now;
+        bst_attitude_propagation_at(p->propagation, seconds, &now);
+        rate = bst_vec3_norm(now);
+    }
     if (p->config.law == BST_ATTITUDE_TUMBLE) { /* energy bounds the rate about the smallest axis */
         const double *i = p->config.inertia_kg_m2;
         rate *= sqrt(fmax(fmax(i[0], i[1]), i[2]) / fmin(fmin(i[0], i[1]), i[2]));

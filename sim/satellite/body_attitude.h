@@ -18,6 +18,12 @@ enum {
     BST_ATTITUDE_TABLE
 };
 
+/* Torques on a body of the law tumble. */
+typedef struct bst_attitude_torques {
+    bool gravity_gradient, solar_pressure, drag;
+    double tolerance_rad;
+} bst_attitude_torques;
+
 /* One phase of an object's attitude. */
 typedef struct bst_attitude_config {
     double from_s;
@@ -26,6 +32,7 @@ typedef struct bst_attitude_config {
     double quaternion[4]; /* q_body_from_gcrf at from_s; all zero: not given */
     double rate_body_deg_per_s[3];
     double inertia_kg_m2[3];
+    bst_attitude_torques torques;
     char file[512];
     char object[64]; /* of the file */
 } bst_attitude_config;
@@ -62,6 +69,19 @@ bst_status bst_body_attitude_accept(bst_ctx *ctx, bst_body_attitude *attitude) B
  * may add to it while others read the attitude. */
 bst_commanded_attitude *bst_body_attitude_commands(const bst_body_attitude *attitude);
 
+/* Torque about the centre of mass in a phase, N m, body axes, at `seconds` after the epoch; false:
+ * unknown then. It depends on its arguments alone; several threads may call it. */
+typedef bool (*bst_body_torque_fn)(void *user, const bst_attitude_config *phase, double seconds,
+                                   bst_quat q_body_from_gcrf, bst_vec3 *torque_nm);
+/* True if a phase has torques; bst_body_attitude_set_torque is then required. */
+bool bst_body_attitude_has_torques(const bst_body_attitude *attitude);
+/* Sets the source of torques, before all calls that follow.
+ *
+ * Given:     torque, user  outlive the attitude
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_body_attitude_set_torque(bst_ctx *ctx, bst_body_attitude *attitude,
+                                        bst_body_torque_fn torque, void *user) BST_MUST_CHECK;
+
 /* Time at which the next phase starts whose attitude continues that of the phase before (spin or
  * tumble without quaternion), s.
  *
@@ -84,7 +104,8 @@ void bst_body_attitude_start(bst_body_attitude *attitude, int phase,
  *            about its x, then y, then z axis. */
 bst_quat bst_body_attitude_at(const bst_body_attitude *attitude, const bst_attitude_state *state);
 
-/* Largest angular rate of a phase about a time, rad/s, without that of the orbit. */
+/* Largest angular rate of a phase about a time, rad/s, without that of the orbit; under torques,
+ * from the rate at that time. */
 double bst_body_attitude_rate_radps(const bst_body_attitude *attitude, double seconds);
 
 #endif

@@ -81,9 +81,7 @@ void bst_tumbling_free(bst_tumbling *t) {
     free(t);
 }
 
-bst_status bst_tumbling_create(bst_ctx *ctx, const double inertia[3], bst_vec3 rate,
-                               bst_tumbling **out) {
-    *out = NULL;
+bst_status bst_tumbling_check(bst_ctx *ctx, const double inertia[3]) {
     for (int k = 0; k < 3; k++) {
         if (!(inertia[k] > 0.0 &&
               inertia[k] <= (inertia[(k + 1) % 3] + inertia[(k + 2) % 3]) * (1.0 + 1e-9))) {
@@ -93,6 +91,28 @@ bst_status bst_tumbling_create(bst_ctx *ctx, const double inertia[3], bst_vec3 r
                             inertia[0], inertia[1], inertia[2]);
         }
     }
+    return BST_OK;
+}
+
+void bst_tumbling_turn(const double inertia[3], double seconds, double step_rad, bst_quat *q,
+                       bst_vec3 *rate) {
+    const double most = fmax(fmax(inertia[0], inertia[1]), inertia[2]);
+    const double least = fmin(fmin(inertia[0], inertia[1]), inertia[2]);
+    /* energy bounds the rate about the axis of the smallest moment */
+    double turned = fabs(seconds) * bst_vec3_norm(*rate) * sqrt(most / least);
+    int steps = (int)fmin(ceil(turned / step_rad), 1e8);
+    motion m = {*q, *rate};
+    for (int k = 0; k < steps; k++) {
+        m = step(inertia, m, seconds / steps);
+    }
+    *q = m.q;
+    *rate = m.w;
+}
+
+bst_status bst_tumbling_create(bst_ctx *ctx, const double inertia[3], bst_vec3 rate,
+                               bst_tumbling **out) {
+    *out = NULL;
+    BST_TRY(bst_tumbling_check(ctx, inertia));
     bst_tumbling *t = calloc(1, sizeof *t);
     if (!t) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a tumbling body");

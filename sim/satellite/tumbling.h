@@ -32,4 +32,18 @@ void bst_tumbling_free(bst_tumbling *tumbling);
  *            *rate_radps  body frame, if not NULL */
 bst_quat bst_tumbling_at(const bst_tumbling *tumbling, double seconds, bst_vec3 *rate_radps);
 
+/* Checks principal moments, kg m^2: above 0, each at most the sum of the others. BST_ERR_CONFIG. */
+bst_status bst_tumbling_check(bst_ctx *ctx, const double inertia_kg_m2[3]) BST_MUST_CHECK;
+
+/* Turns a body without torque, by the classical Runge-Kutta method.
+ *
+ * Given:     inertia_kg_m2  [3] as for bst_tumbling_create
+ *            seconds        any sign
+ *            step_rad       largest rotation in a step; its error is about step_rad^5 / 120
+ *            q              attitude q_body_from_reference at the start
+ *            rate_radps     angular velocity at the start, body frame
+ * Returned:  *q, *rate_radps  after that time */
+void bst_tumbling_turn(const double inertia_kg_m2[3], double seconds, double step_rad, bst_quat *q,
+                       bst_vec3 *rate_radps);
+
 #endif

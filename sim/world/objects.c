@@ -7,6 +7,7 @@
 #include "sim/core/compare.h"
 #include "sim/satellite/interreflection.h"
 #include "sim/world/external_states.h"
+#include "sim/world/object_torque.h"
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/scene/object_shape.h"
 #include "sim/world/world_build.h"
@@ -160,7 +161,15 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
     shape->index = b->world->shape_count;
     b->world->shapes[b->world->shape_count++] = shape;
     object->info.shape = shape;
-    if (config->orbit.forces.shape || config->brightness.heat_balance != BST_HEAT_NONE) {
+    bool torques = bst_body_attitude_has_torques(shape->attitude);
+    if (torques && config->external_states) {
+        return bst_fail(
+            b->ctx, BST_ERR_CONFIG,
+            "%s: /world/objects/%d/attitude: torques of an object with external_states, "
+            "whose place is not known in advance (allowed: one of the two)",
+            b->scenario, index);
+    }
+    if (config->orbit.forces.shape || torques || config->brightness.heat_balance != BST_HEAT_NONE) {
         bst_satellite_make_surfaces(shape->satellite);
     }
     if (config->orbit.forces.shape && !config->external_states) {
@@ -168,6 +177,45 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
                                         shape->burn_count, &shape->forces));
     }
     return config->external_states ? bst_body_attitude_accept(b->ctx, shape->attitude) : BST_OK;
+}
+
+/* Prepares the torques on a listed object whose attitude has some. Where the orbit follows from the
+ * attitude, torques act where the sphere of its spacecraft would be: an orbit of its own. */
+static bst_status make_torque(const bst_world_builder *b, const bst_object_config *config,
+                              int index, world_object *object) {
+    bst_object_shape *shape =
+        object->info.shape ? b->world->shapes[object->info.shape->index] : NULL;
+    if (!shape || !bst_body_attitude_has_torques(shape->attitude)) {
+        return BST_OK;
+    }
+    bst_object_torque_setup setup = {.orbit = &object->orbit,
+                                     .satellite = shape->satellite,
+                                     .burn_s = shape->burn_s,
+                                     .burn_count = shape->burn_count,
+                                     .drag_coefficient = config->orbit.spacecraft.cd,
+                                     .density_scale = config->orbit.forces.density_scale};
+    if (shape->forces) {
+        char path[64];
+        int norad;
+        snprintf(path, sizeof path, "/world/objects/%d/orbit", index);
+        bst_orbit_config sphere = config->orbit;
+        sphere.forces.shape = false;
+        bst_world_orbit *own = calloc(1, sizeof *own);
+        if (!own) {
+            return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for an orbit");
+        }
+        bst_status status =
+            bst_world_orbit_build(b, &sphere, &config->burns, path, object->info.name, own, &norad);
+        if (status != BST_OK) {
+            bst_world_orbit_free(own);
+            free(own);
+            return status;
+        }
+        setup.orbit = setup.own = own;
+    }
+    BST_TRY(bst_object_torque_create(b, &setup, &shape->torque));
+    return bst_body_attitude_set_torque(b->ctx, shape->attitude, bst_object_torque_at,
+                                        shape->torque);
 }
 
 /* Builds the orbit of a listed object; forces may act on its shape. */
@@ -225,6 +273,7 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
             world->occulters[world->occulter_count++] = i;
         }
         BST_TRY(make_shape(b, config, i, object));
+        BST_TRY(make_torque(b, config, i, object));
         BST_TRY(build_orbit(b, config, i, object));
         if (config->external_states) {
             BST_TRY(bst_external_states_create(b->ctx, &object->orbit.external));

@@ -11,25 +11,22 @@
 #define EARTH_RADPS 7.292115e-5
 
 struct bst_surface_torque {
-    bst_satellite *satellite;
+    bst_satellite *own; /* NULL: another's */
     bst_satellite_pose *pose;
     bst_vec3 centre_m;
     double drag_coefficient; /* 0: no air */
 };
 
-bst_status bst_surface_torque_create(bst_ctx *ctx, const char *shape_file, bst_vec3 centre_m,
-                                     double drag_coefficient, bst_surface_torque **out) {
+bst_status bst_surface_torque_create_on(bst_ctx *ctx, const bst_satellite *satellite,
+                                        bst_vec3 centre_m, double drag_coefficient,
+                                        bst_surface_torque **out) {
     bst_surface_torque *t = *out = calloc(1, sizeof *t);
     if (!t) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the shape of a spacecraft");
     }
     t->centre_m = centre_m;
     t->drag_coefficient = drag_coefficient;
-    bst_status status = bst_satellite_load(ctx, shape_file, &t->satellite);
-    if (status == BST_OK) {
-        bst_satellite_make_surfaces(t->satellite);
-        status = bst_satellite_pose_create(ctx, t->satellite, &t->pose);
-    }
+    bst_status status = bst_satellite_pose_create(ctx, satellite, &t->pose);
     if (status != BST_OK) {
         bst_surface_torque_free(t);
         *out = NULL;
@@ -37,10 +34,31 @@ bst_status bst_surface_torque_create(bst_ctx *ctx, const char *shape_file, bst_v
     return status;
 }
 
+bst_status bst_surface_torque_create(bst_ctx *ctx, const char *shape_file, bst_vec3 centre_m,
+                                     double drag_coefficient, bst_surface_torque **out) {
+    bst_satellite *satellite;
+    *out = NULL;
+    BST_TRY(bst_satellite_load(ctx, shape_file, &satellite));
+    bst_satellite_make_surfaces(satellite);
+    bst_status status =
+        bst_surface_torque_create_on(ctx, satellite, centre_m, drag_coefficient, out);
+    if (status == BST_OK) {
+        (*out)->own = satellite;
+    } else {
+        bst_satellite_free(satellite);
+    }
+    return status;
+}
+
+void bst_surface_torque_set_burns(bst_surface_torque *t, const double *burn_s, int count) {
+    t->pose->burn_s = burn_s;
+    t->pose->burn_count = count;
+}
+
 void bst_surface_torque_free(bst_surface_torque *t) {
     if (t) {
         bst_satellite_pose_free(t->pose);
-        bst_satellite_free(t->satellite);
+        bst_satellite_free(t->own);
         free(t);
     }
 }
@@ -61,8 +79,9 @@ bst_vec3 bst_surface_torque_at(bst_surface_torque *t, const bst_surface_state *s
     }
     const bst_vec3 spin = {0.0, 0.0, EARTH_RADPS};
     bst_vec3 wind = bst_vec3_sub(state->velocity_mps, bst_vec3_cross(spin, state->position_m));
-    double density = t->drag_coefficient > 0.0
-                         ? bst_atmosphere_density_kgpm3(bst_astro_height_m(state->position_m))
+    double density = t->drag_coefficient > 0.0 && state->density_scale > 0.0
+                         ? state->density_scale *
+                               bst_atmosphere_density_kgpm3(bst_astro_height_m(state->position_m))
                          : 0.0;
     double speed2 = bst_vec3_dot(wind, wind);
     if (density > 0.0 && speed2 > 0.0) {

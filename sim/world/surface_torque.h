@@ -1,9 +1,10 @@
-/* Torque of sunlight and air on the facets of a spacecraft with a shape. */
+/* Torque of sunlight and air on the facets of a spacecraft or an object with a shape. */
 #ifndef BST_WORLD_SURFACE_TORQUE_H
 #define BST_WORLD_SURFACE_TORQUE_H
 
 #include "boresight/status.h"
 #include "boresight/vec.h"
+#include "sim/satellite/model.h"
 
 /* The shape, with its work memory; for one thread. */
 typedef struct bst_surface_torque bst_surface_torque;
@@ -19,8 +20,16 @@ typedef struct bst_surface_torque bst_surface_torque;
 bst_status bst_surface_torque_create(bst_ctx *ctx, const char *shape_file, bst_vec3 centre_m,
                                      double drag_coefficient,
                                      bst_surface_torque **out) BST_MUST_CHECK;
+/* As bst_surface_torque_create, for a satellite that exists, with its surfaces
+ * (bst_satellite_make_surfaces); it outlives the torque. */
+bst_status bst_surface_torque_create_on(bst_ctx *ctx, const bst_satellite *satellite,
+                                        bst_vec3 centre_m, double drag_coefficient,
+                                        bst_surface_torque **out) BST_MUST_CHECK;
 /* Frees a torque; NULL is allowed. */
 void bst_surface_torque_free(bst_surface_torque *torque);
+
+/* Sets the starts of burns, [count], which joints follow; they outlive the torque. */
+void bst_surface_torque_set_burns(bst_surface_torque *torque, const double *burn_s, int count);
 
 /* A spacecraft among what acts on its surface. */
 typedef struct bst_surface_state {
@@ -29,6 +38,7 @@ typedef struct bst_surface_state {
     bst_vec3 sun_m;                    /* from the spacecraft, GCRF */
     double sunlit;                     /* visible fraction of the Sun's disc */
     double seconds;                    /* after the epoch, for joints */
+    double density_scale;              /* of the mean density of the air; 0: no air */
 } bst_surface_state;
 
 /* Torque about the centre of mass, N m, body axes.

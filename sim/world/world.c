@@ -6,6 +6,7 @@
 #include "sim/optics/band.h"
 #include "sim/optics/ghosts.h"
 #include "sim/optics/psf.h"
+#include "sim/world/object_torque.h"
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/orbit/ephemeris.h"
 #include "sim/world/scene/object_shape.h"
@@ -282,6 +283,7 @@ void bst_world_free(bst_world *world) {
     }
     free(world->brightness);
     for (int i = 0; i < world->shape_count; i++) {
+        bst_object_torque_free(world->shapes[i]->torque);
         bst_object_shape_free(world->shapes[i]);
     }
     free(world->occulters);

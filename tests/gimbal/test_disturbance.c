@@ -27,7 +27,7 @@ static void test_gravity_gradient(void **state) {
             expected,
             bst_vec3_cross(lever, bst_vec3_scale(there, -BST_EARTH_MU_M3PS2 / (r * r * r))));
     }
-    bst_vec3 torque = bst_spacecraft_gravity_gradient_torque(&inertia, q, place);
+    bst_vec3 torque = bst_gravity_gradient_torque(&inertia, q, place);
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(torque, expected)) / bst_vec3_norm(expected), 0.0,
                      1e-8); /* cancellation in Newton's forces: 1e-16 r / d */
     /* none about the way to the Earth */

@@ -62,7 +62,8 @@ static void test_plate(void **state) {
     bst_surface_state sky = {.q_body_from_gcrf = q,
                              .position_m = {42e6, 0, 0},
                              .sun_m = bst_vec3_scale(bst_quat_rotate(back, z), 2.0 * BST_AU_M),
-                             .sunlit = 0.5};
+                             .sunlit = 0.5,
+                             .density_scale = 1.0};
     double force = BST_SUNLIGHT_PRESSURE_PA * 6.0 * 0.5 / 4.0;
     bst_vec3 got = bst_surface_torque_at(t, &sky);
     bst_assert_close(got.y, force * 1.0, 1e-12 * force); /* x times -z is y */

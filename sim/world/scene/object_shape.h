@@ -17,8 +17,9 @@ typedef struct bst_object_shape {
     int glint_count;
     double *burn_s; /* [burn_count] starts of the object's burns */
     int burn_count;
-    bool interreflection;     /* light is reflected twice */
-    bst_shape_forces *forces; /* NULL: the orbit does not follow from the shape */
+    bool interreflection;             /* light is reflected twice */
+    bst_shape_forces *forces;         /* NULL: the orbit does not follow from the shape */
+    struct bst_object_torque *torque; /* NULL: none; the world's, which frees it */
 } bst_object_shape;
 
 /* Where a body stands to its light at one time. */
