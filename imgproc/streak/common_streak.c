@@ -333,8 +333,12 @@ typedef struct wanted {
 static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_common_streak *out) {
     const bst_star_path_image image = bst_streak_finder_image(f);
     const int most = q->most;
-    BST_TRY(bst_path_filter_renew(ctx, &f->path, &image, NULL, f->psf_sigma_px, q->least_inside,
-                                  &f->filter));
+    if (f->filter && bst_path_filter_is_of(f->filter, &f->path)) {
+        bst_path_filter_restart(f->filter, &image);
+    } else {
+        BST_TRY(bst_path_filter_renew(ctx, &f->path, &image, NULL, f->psf_sigma_px, q->least_inside,
+                                      &f->filter));
+    }
     bst_path_filter *filter = f->filter;
     const bool point = f->path.count == 1;
     out->items = f->items;
