@@ -7,7 +7,7 @@
 #include "imgproc/streak/path_filter_internal.h"
 #include "sim/core/simd.h"
 
-enum { BLOCK = BST_PATH_BLOCK, SHIFTS = BST_PATH_SHIFTS, KERNEL = 5 };
+enum { BLOCK = BST_PATH_BLOCK, KERNEL = 5 };
 enum { MOST_SIGMA = 4 }; /* widest PSF, px */
 /* Passes of the clipped spread, the places that it needs, and those that it takes. */
 enum { SPREAD_PASSES = 3, LEAST_PLACES = 1000, SPREAD_PLACES = 65536 };
@@ -88,10 +88,8 @@ static double widest_step(const bst_star_path *p) {
     return widest;
 }
 
-/* Response of the filter to its own path, shifted along it.
- *
- * Given:     step_px  greatest distance of consecutive samples */
-static double response_at(const bst_path_filter *f, double shift_px, double step_px) {
+/* Response of the filter to its own path, shifted along it. */
+static double response_at(const bst_path_filter *f, double shift_px) {
     const bst_star_path *p = &f->path;
     const double reach = KERNEL * f->psf_sigma_px;
     double sum = 0.0;
@@ -104,7 +102,7 @@ static double response_at(const bst_path_filter *f, double shift_px, double step
             if (r2 < reach * reach) {
                 sum += p->light[k] * p->light[l] * bst_path_filter_correlation(f, r2);
             } else { /* those that are too far away for certain */
-                next = (int)fmin(fmax((sqrt(r2) - reach) / step_px, 1.0), p->count);
+                next = (int)fmin(fmax((sqrt(r2) - reach) / f->step_px, 1.0), p->count);
             }
             l += next;
         }
@@ -125,12 +123,18 @@ static void measure_path(bst_path_filter *f) {
     f->systematic_px = SYSTEMATIC_PX + 0.5 * half * half * fmax(p->centre[0], p->centre[1]);
     f->direction[0] = f->length_px > 0.0 ? dx / f->length_px : 1.0;
     f->direction[1] = f->length_px > 0.0 ? dy / f->length_px : 0.0;
-    const double step = fmax(1.001 * widest_step(p), 1e-9);
-    double whole = response_at(f, 0.0, step);
-    f->correlation = whole / f->squares;
-    for (int i = 0; i < SHIFTS; i++) {
-        f->loss[i] = 1.0 - response_at(f, i, step) / whole;
+    f->step_px = fmax(1.001 * widest_step(p), 1e-9);
+    f->whole = response_at(f, 0.0);
+    f->correlation = f->whole / f->squares;
+    f->losses = 0;
+}
+
+double bst_path_filter_loss(bst_path_filter *f, int shift_px) {
+    assert(shift_px >= 0 && shift_px < BST_PATH_SHIFTS);
+    for (; f->losses <= shift_px; f->losses++) {
+        f->loss[f->losses] = 1.0 - response_at(f, f->losses) / f->whole;
     }
+    return f->loss[shift_px];
 }
 
 /* Nearest whole number, halves away from zero. */
@@ -183,9 +187,9 @@ static void list_samples(bst_path_filter *f, int bx, int by, int step) {
     }
 }
 
-/* First of BLOCK places, some px apart, that is not before one; BLOCK: none is. */
+/* First of BLOCK places, 1 or 2 px apart, that is not before one; BLOCK: none is. */
 static int first_place(int from, int least, int step) {
-    int i = from < least ? (least - from + step - 1) / step : 0;
+    int i = from < least ? (least - from + step - 1) >> (step - 1) : 0;
     return i < BLOCK ? i : BLOCK;
 }
 
@@ -240,7 +244,7 @@ static void note_highest(bst_path_filter *f, int block, float snr) {
     } else if (before >= f->of_row[row]) {
         f->of_row[row] = 0.0f;
         for (int i = 0; i < f->columns; i++) {
-            f->of_row[row] = fmaxf(f->of_row[row], all[i]);
+            f->of_row[row] = all[i] > f->of_row[row] ? all[i] : f->of_row[row];
         }
     }
 }
@@ -407,7 +411,7 @@ static bst_status make_room(bst_ctx *ctx, bst_path_filter *f, const bst_star_pat
                             bool weights) {
     const size_t blocks = (size_t)f->blocks, places = blocks * BLOCK * BLOCK;
     if (places <= f->places && image->width == f->frame[0] && image->height == f->frame[1] &&
-        weights == (f->weights != NULL) && f->bounded <= (f->half != NULL)) {
+        weights == (f->weights != NULL) && f->by_bounds <= (f->half != NULL)) {
         return BST_OK;
     }
     free_memory(f);
@@ -420,14 +424,14 @@ static bst_status make_room(bst_ctx *ctx, bst_path_filter *f, const bst_star_pat
     const size_t pixels = f->stride * ((size_t)image->height + 2 * BLOCK);
     f->image = calloc(pixels, sizeof *f->image);
     f->weights = weights ? calloc(pixels, sizeof *f->weights) : NULL;
-    f->half = f->bounded ? calloc(4 * f->half_size, sizeof *f->half) : NULL;
+    f->half = f->by_bounds ? calloc(4 * f->half_size, sizeof *f->half) : NULL;
     f->response = malloc(places * sizeof *f->response);
     f->per_noise = malloc(places * sizeof *f->per_noise);
     f->highest = malloc(blocks * sizeof *f->highest);
     f->of_row = malloc(blocks * sizeof *f->of_row);
     f->first = malloc(blocks * sizeof *f->first);
     f->filtered = malloc(blocks * sizeof *f->filtered);
-    if (!f->image || (weights && !f->weights) || (f->bounded && !f->half) || !f->response ||
+    if (!f->image || (weights && !f->weights) || (f->by_bounds && !f->half) || !f->response ||
         !f->per_noise || !f->highest || !f->of_row || !f->first || !f->filtered) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
                         f->frame[0], f->frame[1]);
@@ -470,7 +474,7 @@ bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
     f->blocks = f->columns * f->rows;
     f->subtractions = 0;
     f->left_out = false;
-    f->bounded = !weights && path->count >= LONG_PATH;
+    f->by_bounds = !weights && path->count >= LONG_PATH;
     bst_status status = make_room(ctx, f, image, weights != NULL);
     if (status != BST_OK) {
         bst_path_filter_free(f);
@@ -482,15 +486,15 @@ bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
     pad_image(f, f->weights, weights);
     memset(f->highest, 0, (size_t)f->blocks * sizeof *f->highest);
     memset(f->of_row, 0, (size_t)f->rows * sizeof *f->of_row);
-    if (f->bounded) {
+    if (f->by_bounds) {
         split_image(f, image->values);
     }
-    for (int y = 0; f->bounded && y < f->rows; y += 2) {
+    for (int y = 0; f->by_bounds && y < f->rows; y += 2) {
         for (int x = 0; x < f->columns; x += 2) {
             bound_blocks(f, x, y);
         }
     }
-    for (int i = 0; !f->bounded && i < f->blocks; i++) {
+    for (int i = 0; !f->by_bounds && i < f->blocks; i++) {
         filter_block(f, i);
     }
     memcpy(f->first, f->highest, (size_t)f->blocks * sizeof *f->first);
@@ -524,7 +528,7 @@ void bst_path_filter_restart(bst_path_filter *f, const bst_star_path_image *imag
 }
 
 double bst_path_filter_spread(const bst_path_filter *f) {
-    assert(f && f->subtractions == 0 && !f->bounded);
+    assert(f && f->subtractions == 0 && !f->by_bounds);
     double spread = 1.0;
     const int places = f->blocks * BLOCK * BLOCK;
     const int stride = places / SPREAD_PLACES | 1; /* odd: columns do not repeat */

@@ -42,15 +42,18 @@ struct bst_path_filter {
     float *first;     /* [blocks] those before the first subtraction */
     int *filtered;    /* [blocks] subtractions before that, or the state of the block */
     int subtractions;
-    bool bounded;       /* blocks begin with bounds */
+    bool by_bounds;     /* blocks begin with bounds, not filtered */
     bool left_out;      /* some places are */
     double correlation; /* variance of the response over the sum of the squared light */
     double squares;     /* sum of the squared light of the whole path */
+    double whole;       /* response to the whole path, of unit amplitude */
+    double step_px;     /* greatest distance of consecutive samples */
     double psf_sigma_px;
     double least_inside;            /* share of the path inside the frame */
     double length_px, direction[2]; /* from end to end */
     double systematic_px;           /* position error beside the noise */
-    double loss[BST_PATH_SHIFTS];   /* share of the response that a shift by so many px loses */
+    int losses;                     /* that are known */
+    double loss[BST_PATH_SHIFTS];   /* see bst_path_filter_loss */
 };
 
 /* Correlation of two samples of the image at a distance. */
@@ -61,5 +64,9 @@ static inline double bst_path_filter_correlation(const bst_path_filter *f, doubl
 /* Filters a block if only a bound of it is known, or again if it was before the latest
  * subtraction. */
 void bst_path_filter_refresh(bst_path_filter *filter, int block);
+/* Share of the response that a shift along the path by whole pixels loses.
+ *
+ * Given:     shift_px  0 to BST_PATH_SHIFTS - 1 */
+double bst_path_filter_loss(bst_path_filter *filter, int shift_px);
 
 #endif

@@ -56,13 +56,15 @@ static double vertex(const bst_path_filter *f, double x, double y, double dx, do
 }
 
 /* Standard deviation of a star's place along its streak. */
-static double along_sigma_px(const bst_path_filter *f, double snr) {
-    double wanted = ALONG_LOSS / (snr * snr);
+static double along_sigma_px(bst_path_filter *f, double snr) {
+    double wanted = ALONG_LOSS / (snr * snr), before = bst_path_filter_loss(f, 0);
     for (int i = 1; i < SHIFTS; i++) {
-        if (f->loss[i] >= wanted) {
-            double share = (wanted - f->loss[i - 1]) / (f->loss[i] - f->loss[i - 1]);
+        double loss = bst_path_filter_loss(f, i);
+        if (loss >= wanted) {
+            double share = (wanted - before) / (loss - before);
             return i == 1 ? sqrt(share) : i - 1 + share; /* parabolic at its maximum */
         }
+        before = loss;
     }
     return SHIFTS;
 }
@@ -87,9 +89,8 @@ static int first_block(const bst_path_filter *f) {
 static int highest_block(bst_path_filter *f) {
     for (int best = first_block(f); best >= 0; best = first_block(f)) {
         const int x = best % f->columns, y = best / f->columns;
-        const bool known = f->filtered[best] >= f->subtractions;
-        bst_path_filter_refresh(f, best);
-        if (!known) {
+        if (f->filtered[best] < f->subtractions) {
+            bst_path_filter_refresh(f, best);
             continue;
         }
         for (int k = 0; k < 9; k++) {
