@@ -20,9 +20,10 @@ static const double SYSTEMATIC_PX = 0.2;
 /* Least share of the path inside the frame over what is asked: weights may exceed 1 a little. */
 static const double WEIGHED = 0.8;
 
-/* The highest of every second place may lie below the highest of all by this many standard
- * deviations of what they do not share, beyond the loss of a place 1 px beside the path. */
-static const double BOUND_SIGMAS = 2.5;
+/* The highest SNR of a block over that of its places on every second row and column: a place is up
+ * to 1 px beside the next of them, of streaks that the frame cuts short a little more; and by noise
+ * so many standard deviations of what two places 1 px apart do not share. */
+static const double BESIDE2_PX2 = 1.5, BOUND_SIGMAS = 2.5;
 /* Values of the response beyond this are clipped; mean square of a normal deviate up to it:
  * 1 - 2 c phi(c) / erf(c / sqrt(2)) */
 static const double SPREAD_CLIP = 3.0, SPREAD_SHARE = 0.9733;
@@ -357,6 +358,7 @@ static void highest_of_quarters(const float *a, const float *b, float highest[4]
 static void bound_blocks(bst_path_filter *f, int column, int row) {
     float per_noise[BLOCK * BLOCK], response[BLOCK * BLOCK], highest[4] = {0.0f};
     bool any[4] = {false};
+    const double beside = bst_path_filter_correlation(f, BESIDE2_PX2);
     const double near = bst_path_filter_correlation(f, 1.0);
     const double more = BOUND_SIGMAS * sqrt(1.0 - near * near) / near;
     list_samples(f, column * BLOCK, row * BLOCK, 2);
@@ -368,7 +370,7 @@ static void bound_blocks(bst_path_filter *f, int column, int row) {
     for (int k = 0; k < 4; k++) {
         const int x = column + k % 2, y = row + k / 2, block = y * f->columns + x;
         if (x < f->columns && y < f->rows) {
-            note_highest(f, block, any[k] ? (float)((double)highest[k] / near + more) : 0.0f);
+            note_highest(f, block, any[k] ? (float)((double)highest[k] / beside + more) : 0.0f);
             f->filtered[block] = BST_PATH_BOUND;
         }
     }
