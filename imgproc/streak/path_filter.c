@@ -11,7 +11,7 @@ enum { BLOCK = BST_PATH_BLOCK, KERNEL = 5 };
 enum { MOST_SIGMA = 4 }; /* widest PSF, px */
 /* Passes of the clipped spread, the places that it needs, and those that it takes. */
 enum { SPREAD_PASSES = 3, LEAST_PLACES = 1000, SPREAD_PLACES = 65536 };
-/* Samples of a path from which on every second place of every second row tells where no star is:
+/* Samples of a path from which on every second place of every second row shows where no star is:
  * a star is less than 1 px beside the lines through them along its path. */
 enum { LONG_PATH = 16 };
 
