@@ -223,10 +223,14 @@ typedef struct choices {
     int count;
 } choices;
 
-/* Adds a path to those to try. */
-static void add_choice(choices *c, const bst_star_path *path, double quality) {
+/* Adds a path to those to try.
+ *
+ * Given:     first  before those of the same quality */
+static void add_choice(choices *c, const bst_star_path *path, double quality, bool first) {
     int at = c->count < TRIES ? c->count++ : TRIES;
-    for (; at > 0 && c->items[at - 1].quality < quality; at--) {
+    for (; at > 0 &&
+           (c->items[at - 1].quality < quality || (first && c->items[at - 1].quality <= quality));
+         at--) {
         if (at < TRIES) {
             c->items[at] = c->items[at - 1];
         }
@@ -253,7 +257,7 @@ static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_
         if (quality > 0.0) {
             whole += !is_cut;
             cut += is_cut;
-            add_choice(c, &path, quality);
+            add_choice(c, &path, quality, i == BST_STREAK_FINDER_POINT);
         }
     }
     return BST_OK;
