@@ -223,10 +223,14 @@ typedef struct choices {
     int count;
 } choices;
 
-/* Adds a path to those to try. */
-static void add_choice(choices *c, const bst_star_path *path, double quality) {
+/* Adds a path to those to try.
+ *
+ * Given:     first  before those of the same quality */
+static void add_choice(choices *c, const bst_star_path *path, double quality, bool first) {
     int at = c->count < TRIES ? c->count++ : TRIES;
-    for (; at > 0 && c->items[at - 1].quality < quality; at--) {
+    for (; at > 0 &&
+           (c->items[at - 1].quality < quality || (first && c->items[at - 1].quality <= quality));
+         at--) {
         if (at < TRIES) {
             c->items[at] = c->items[at - 1];
         }
@@ -253,7 +257,7 @@ static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_
         if (quality > 0.0) {
             whole += !is_cut;
             cut += is_cut;
-            add_choice(c, &path, quality);
+            add_choice(c, &path, quality, i == BST_STREAK_FINDER_POINT);
         }
     }
     return BST_OK;
@@ -298,14 +302,25 @@ static bst_status try_choices(attempt *a, choices *c, bst_plate_solve_result *ou
 }
 
 /* True if the best path needs no comparison with those of more shapes: a streak that fits better
- * than a point and has certain ends, or a point if the first shape is one, too. */
-static bool is_clear(const choices *c) {
+ * than a point and has certain ends, or a point if the first shape is one, too.
+ *
+ * Given:     against_points  it fits better than points, which are not among the choices */
+static bool is_clear(const choices *c, bool against_points) {
     const bst_star_path *best = &c->items[0].path;
-    if (c->count < 2) {
+    if (c->count < (against_points ? 1 : 2)) {
         return false;
     }
     return best->count > 1 ? fmin(best->margin[0], best->margin[1]) > LEAST_MARGIN
                            : c->items[1].path.count == 1;
+}
+
+/* Measures the first shape, and points if they may fit better.
+ *
+ * Returned:  *no_points  they were not measured */
+static bst_status measure_first(attempt *a, choices *c, bool *no_points) {
+    BST_TRY(measure_shapes(a, 0, 1, 0, false, c));
+    *no_points = c->count > 0 && bst_streak_finder_points_fit_worse(a->finder, c->items[0].quality);
+    return *no_points ? BST_OK : measure_shapes(a, BST_STREAK_FINDER_POINT, 1, 0, false, c);
 }
 
 static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
@@ -313,10 +328,13 @@ static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
     if (!c) {
         return bst_fail(a->ctx, BST_ERR_MEMORY, "no memory for the streaks of a frame");
     }
-    bst_status status =
-        measure_shapes(a, BST_STREAK_FINDER_POINT, 2, 0, false, c); /* and the point */
-    if (status == BST_OK && is_clear(c)) {
+    bool no_points;
+    bst_status status = measure_first(a, c, &no_points);
+    if (status == BST_OK && is_clear(c, no_points)) {
         status = try_choice(a, &c->items[0], out);
+    }
+    if (status == BST_OK && !out->attitude.solved && no_points) {
+        status = measure_shapes(a, BST_STREAK_FINDER_POINT, 1, 0, false, c);
     }
     if (status == BST_OK && !out->attitude.solved) {
         status = measure_shapes(a, 1, FIRST_SHAPES - 1, 0, false, c);

@@ -13,22 +13,11 @@
 /* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
 enum { LINE_HALF = 5, LINE_STEP = 2, DIRECTIONS = 16, LINE_REACH = BST_STREAK_LINE_REACH };
 enum { MOST_REACH = 12, REFINING_STARS = 15 };
-/* Columns whose medians are taken together. */
-enum { COLUMNS = 16 };
-/* Side of the cells of an uneven background, px. */
-enum { CELL = 32 };
 /* Samples on either side that overlap: those of the widest PSF six times over. */
 enum { OVERLAP = 12 };
+/* Values of which the greatest is sought at a time. */
+enum { LANES = 16 };
 
-/* A background is uneven if the levels of its cells differ by more than this; others stay as they
- * are. Not calibrated: a frame with a glow of 200 sigma is solved without this, one of 1000 is not
- * (docs/results/twin.md). */
-static const double UNEVEN_SIGMA = 50.0;
-/* Negative pixels below this are bad, sigma. */
-static const float LEAST_SIGMA = -5.0f;
-/* A pixel above HOT_SIGMA is bad if its neighbours, less their noise, are below this share of it.
- */
-static const float HOT_SIGMA = 8.0f, HOT_SHARE = 0.2f, NEIGHBOUR_SIGMA = 2.0f;
 /* Assumed width of the PSF. */
 static const double USUAL_PSF_SIGMA_PX = 1.0;
 /* Widest PSF: three standard deviations fit into MOST_REACH. */
@@ -54,142 +43,23 @@ static const double USUAL_INSIDE = 0.25;
 
 typedef bst_streak_finder finder;
 
-/* Median of the values that are not NAN; reorders them. */
-static float median(float *values, int count) {
-    int kept = 0;
-    for (int i = 0; i < count; i++) {
-        if (!isnan(values[i])) {
-            values[kept++] = values[i];
+/* Greatest of the values and zero. */
+BST_CLONES
+static float highest_value(const float *values, size_t count) {
+    float most[LANES] = {0.0f};
+    size_t i = 0;
+    for (; i + LANES <= count; i += LANES) {
+        for (int k = 0; k < LANES; k++) {
+            most[k] = values[i + (size_t)k] > most[k] ? values[i + (size_t)k] : most[k];
         }
     }
-    return kept > 0 ? bst_value_of_rank(values, kept, kept / 2) : 0.0f;
-}
-
-/* Noise of the image, by the median of its absolute values. */
-static double noise_of(finder *f) {
-    const size_t pixels = (size_t)f->width * (size_t)f->height;
-    for (size_t i = 0; i < pixels; i++) {
-        f->scratch[i] = fabsf(f->image[i]);
+    for (; i < count; i++) {
+        most[0] = fmaxf(most[0], values[i]);
     }
-    return fmax(1.4826 * (double)median(f->scratch, (int)pixels), 1e-9);
-}
-
-/* Level and noise of a cell; the noise by what lies below the level, where no stars are. */
-static void measure_cell(finder *f, int cx, int cy, float out[2]) {
-    int count = 0;
-    for (int y = cy * CELL; y < (cy + 1) * CELL && y < f->height; y++) {
-        for (int x = cx * CELL; x < (cx + 1) * CELL && x < f->width; x++) {
-            float v = f->image[(size_t)y * (size_t)f->width + (size_t)x];
-            if (!isnan(v)) {
-                f->scratch[count++] = v;
-            }
-        }
+    for (int k = 1; k < LANES; k++) {
+        most[0] = fmaxf(most[0], most[k]);
     }
-    /* which leaves the values up to it in front */
-    out[0] = count > 0 ? bst_value_of_rank(f->scratch, count, count / 2) : 0.0f;
-    out[1] = count > 0
-                 ? (out[0] - bst_value_of_rank(f->scratch, count / 2 + 1, count / 4)) / 0.6745f
-                 : 0.0f;
-}
-
-/* Removes a very uneven background, as of the Earth's limb or a ghost: levels of cells, between
- * whose middles it is bilinear. Noise that is greater there is reduced to the frame's. True if the
- * background was so. */
-static bool flatten(finder *f) {
-    const int nx = (f->width + CELL - 1) / CELL, ny = (f->height + CELL - 1) / CELL;
-    float low = HUGE_VALF, high = -HUGE_VALF;
-    float(*cells)[2] = (float(*)[2])f->lines; /* not in use yet; a cell has 32 x 32 px */
-    if ((size_t)nx * (size_t)ny * 2 > (size_t)f->width * (size_t)f->height) {
-        return false;
-    }
-    for (int i = 0; i < nx * ny; i++) {
-        measure_cell(f, i % nx, i / nx, cells[i]);
-        low = fminf(low, cells[i][0]);
-        high = fmaxf(high, cells[i][0]);
-    }
-    for (int i = 0; i < nx * ny; i++) {
-        f->scratch[i] = cells[i][1];
-    }
-    const float usual = fmaxf(median(f->scratch, nx * ny), 1e-9f);
-    if (!((double)(high - low) > UNEVEN_SIGMA * (double)usual)) {
-        return false;
-    }
-    for (int y = 0; y < f->height; y++) {
-        float v = fmaxf(((float)y + 0.5f) / CELL - 0.5f, 0.0f);
-        int j = (int)v, j1 = j + 1 < ny ? j + 1 : j;
-        for (int x = 0; x < f->width; x++) {
-            float u = fmaxf(((float)x + 0.5f) / CELL - 0.5f, 0.0f), value[2];
-            int i = (int)u, i1 = i + 1 < nx ? i + 1 : i;
-            for (int k = 0; k < 2; k++) {
-                float top = cells[j * nx + i][k] +
-                            (u - (float)i) * (cells[j * nx + i1][k] - cells[j * nx + i][k]);
-                float bottom = cells[j1 * nx + i][k] +
-                               (u - (float)i) * (cells[j1 * nx + i1][k] - cells[j1 * nx + i][k]);
-                value[k] = top + (v - (float)j) * (bottom - top);
-            }
-            float *at = &f->image[(size_t)y * (size_t)f->width + (size_t)x];
-            *at = (*at - value[0]) / fmaxf(value[1] / usual, 1.0f);
-        }
-    }
-    return true;
-}
-
-/* Removes the medians of columns and rows and divides by the noise. */
-static void clean(finder *f) {
-    const int w = f->width, h = f->height;
-    float *scratch = f->scratch;
-    for (int x0 = 0; x0 < w; x0 += COLUMNS) {
-        const int columns = x0 + COLUMNS < w ? COLUMNS : w - x0;
-        float level[COLUMNS];
-        for (int y = 0; y < h; y++) { /* a cache line of each row */
-            for (int x = 0; x < columns; x++) {
-                scratch[x * h + y] = f->image[(size_t)y * (size_t)w + (size_t)(x0 + x)];
-            }
-        }
-        for (int x = 0; x < columns; x++) {
-            level[x] = median(&scratch[x * h], h);
-        }
-        for (int y = 0; y < h; y++) {
-            for (int x = 0; x < columns; x++) {
-                f->image[(size_t)y * (size_t)w + (size_t)(x0 + x)] -= level[x];
-            }
-        }
-    }
-    for (int y = 0; y < h; y++) {
-        float *row = &f->image[(size_t)y * (size_t)w];
-        memcpy(scratch, row, (size_t)w * sizeof *row);
-        float level = median(scratch, w);
-        for (int x = 0; x < w; x++) {
-            row[x] -= level;
-        }
-    }
-    const size_t pixels = (size_t)w * (size_t)h;
-    f->sigma = noise_of(f);
-    if (flatten(f)) {
-        f->sigma = noise_of(f);
-    }
-    for (size_t i = 0; i < pixels; i++) {
-        float v = f->image[i] / (float)f->sigma;
-        f->image[i] = isnan(v) ? 0.0f : v < LEAST_SIGMA ? LEAST_SIGMA : v;
-    }
-}
-
-/* Clears pixels that stand out from all their neighbours: no PSF is as narrow. */
-static void remove_hot_pixels(finder *f) {
-    const int w = f->width;
-    for (int y = 1; y < f->height - 1; y++) {
-        for (int x = 1; x < w - 1; x++) {
-            float *at = &f->image[y * w + x], most = LEAST_SIGMA;
-            if (*at < HOT_SIGMA) {
-                continue;
-            }
-            for (int k = 0; k < 9; k++) {
-                float v = at[(k / 3 - 1) * w + k % 3 - 1];
-                most = k != 4 && v > most ? v : most;
-            }
-            *at = most - NEIGHBOUR_SIGMA < HOT_SHARE * *at ? 0.0f : *at;
-        }
-    }
+    return most[0];
 }
 
 /* Adds a row, scaled. */
@@ -288,7 +158,7 @@ static double light_along(const finder *f, double x_px, double y_px) {
         values[k] = (float)bst_star_path_image_at(&image, x_px + m[0] * u[0] + m[1] * u[1],
                                                   y_px + m[1] * u[0] + m[2] * u[1]);
     }
-    return fmax((double)median(values, f->path.count), 1.0);
+    return fmax((double)bst_value_of_rank(values, f->path.count, f->path.count / 2), 1.0);
 }
 
 /* Makes the path of a shape.
@@ -297,8 +167,7 @@ static double light_along(const finder *f, double x_px, double y_px) {
 static bool fit_shape(finder *f, const bst_streak_shape *s, bool extend) {
     const bst_star_path_image image = bst_streak_finder_image(f);
     double x, y;
-    memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
-    bst_streak_finder_flood(f, s->level, s->from, 1);
+    bst_streak_finder_flood(f, s->level, s->from, ++f->floods);
     if (!bst_star_path_fit(&f->path, &image, f->stack, f->count, &x, &y)) {
         return false;
     }
@@ -333,8 +202,12 @@ typedef struct wanted {
 static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_common_streak *out) {
     const bst_star_path_image image = bst_streak_finder_image(f);
     const int most = q->most;
-    BST_TRY(bst_path_filter_renew(ctx, &f->path, &image, NULL, f->psf_sigma_px, q->least_inside,
-                                  &f->filter));
+    if (f->filter && bst_path_filter_is_of(f->filter, &f->path)) {
+        bst_path_filter_restart(f->filter, &image);
+    } else {
+        BST_TRY(bst_path_filter_renew(ctx, &f->path, &image, NULL, f->psf_sigma_px, q->least_inside,
+                                      &f->filter));
+    }
     bst_path_filter *filter = f->filter;
     const bool point = f->path.count == 1;
     out->items = f->items;
@@ -429,6 +302,14 @@ static double fit_quality(const bst_common_streak *s) {
         weight *= 0.5;
     }
     return sum;
+}
+
+bool bst_streak_finder_points_fit_worse(const finder *f, double quality) {
+    assert(f);
+    const size_t pixels = (size_t)f->width * (size_t)f->height;
+    /* the response to a point is the image; weights of stars add up to less than 2 */
+    const double snr = (double)highest_value(f->smooth, pixels);
+    return snr >= REFINING_SNR && 2.0 * snr * snr <= quality;
 }
 
 /* True if a path of the same ends has been measured. */
@@ -563,8 +444,7 @@ bst_status bst_streak_finder_create(bst_ctx *ctx, const float *pixels, int width
         return status;
     }
     memcpy(f->image, pixels, (size_t)width * (size_t)height * sizeof *f->image);
-    clean(f);
-    remove_hot_pixels(f);
+    bst_streak_finder_clean(f);
     convolve(f, options->psf_sigma_px > 0.0 ? fmin(options->psf_sigma_px, MOST_PSF_SIGMA_PX)
                                             : USUAL_PSF_SIGMA_PX);
     if (!options->known_path) {

@@ -71,6 +71,9 @@ bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *finder, in
                                      bool extend, bst_star_path *path,
                                      double *quality) BST_MUST_CHECK;
 
+/* True if the frame has points, and they are certain to fit worse than a path of a quality. */
+bool bst_streak_finder_points_fit_worse(const bst_streak_finder *finder, double quality);
+
 /* Finds all stars by a path, also those whose middle is outside the frame.
  *
  * Given:     path  copied; from bst_streak_finder_measure

@@ -33,6 +33,7 @@ struct bst_streak_finder {
                              NULL: all are 1 */
     double point[2];      /* place of the point source that was removed last; NAN: none was */
     int count;            /* pixels on the stack: those of the latest source */
+    int floods;           /* numbers in use as labels */
     bst_star_path path;
     bst_path_filter *filter; /* of the latest search; NULL: none yet */
     bst_common_streak_options options;
@@ -43,6 +44,9 @@ struct bst_streak_finder {
     int measured_count;
 };
 
+/* Removes the medians of columns and rows, and a very uneven background; divides by the noise, and
+ * clears hot pixels. Uses finder->scratch, lines and label. */
+void bst_streak_finder_clean(bst_streak_finder *finder);
 /* Convolves an image of the frame's size with a Gaussian; uses finder->scratch.
  *
  * Given:     sigma_px  at most 4 px

@@ -12,7 +12,7 @@ typedef struct bst_path_filter bst_path_filter;
  * The response at a place is the sum of the image along the path there, weighted by the path's
  * light. Its noise is that of the samples inside the frame.
  *
- * Given:     path          must outlive the filter
+ * Given:     path          copied
  *            image         of unit noise after the convolution with a Gaussian of psf_sigma_px
  *            psf_sigma_px  up to 4 px
  *            least_inside  share of the path that must be inside the frame, by its squared light
@@ -44,6 +44,12 @@ bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
                                  const bst_star_path_image *image, const float *weights,
                                  double psf_sigma_px, double least_inside,
                                  bst_path_filter **filter) BST_MUST_CHECK;
+/* True for the filter of a path. */
+bool bst_path_filter_is_of(const bst_path_filter *filter, const bst_star_path *path);
+/* Begins the search anew, with nothing subtracted and nothing left out.
+ *
+ * Given:     image  that of the filter's creation, with the same values */
+void bst_path_filter_restart(bst_path_filter *filter, const bst_star_path_image *image);
 /* Frees a filter; NULL is allowed. */
 void bst_path_filter_free(bst_path_filter *filter);
 

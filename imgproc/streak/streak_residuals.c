@@ -116,7 +116,8 @@ static int pixel_on_path(const finder *f, double x_px, double y_px, const double
 /* Notes the amplitude of a star around its path, in f->scratch. */
 void bst_streak_finder_cover(finder *f, const bst_path_filter_peak *peak) {
     double m[3];
-    int r = (int)ceil(COVER_SIGMA * f->psf_sigma_px);
+    const int r = (int)ceil(COVER_SIGMA * f->psf_sigma_px);
+    const float amplitude = (float)peak->amplitude;
     bst_star_path_map(&f->path, peak->x_px, peak->y_px, m);
     for (int k = 0; k < f->path.count; k++) {
         int at = pixel_on_path(f, peak->x_px, peak->y_px, m, k);
@@ -124,7 +125,7 @@ void bst_streak_finder_cover(finder *f, const bst_path_filter_peak *peak) {
         for (int y = cy - r > 0 ? cy - r : 0; at >= 0 && y <= cy + r && y < f->height; y++) {
             for (int x = cx - r > 0 ? cx - r : 0; x <= cx + r && x < f->width; x++) {
                 float *v = &f->scratch[y * f->width + x];
-                *v = fmaxf(*v, (float)peak->amplitude);
+                *v = *v > amplitude ? *v : amplitude;
             }
         }
     }

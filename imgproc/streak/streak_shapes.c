@@ -119,6 +119,7 @@ int bst_streak_finder_list_shapes(finder *f, shape out[BST_STREAK_SHAPES]) {
             }
         }
     }
+    f->floods = number;
     for (int i = 0; i < count; i++) {
         int width = out[i].x1 - out[i].x0, height = out[i].y1 - out[i].y0, agreeing = 0;
         for (int k = 0; k < count; k++) {

@@ -233,12 +233,18 @@ static void ends_of_a_long_path(void **state) {
     }
     const bst_common_streak_options options = {.max_sources = 40, .least_snr = 15.0};
     bst_streak_finder *finder;
-    bst_star_path found;
+    bst_star_path found, points;
     double quality;
     bst_assert_ok(&ctx, bst_streak_finder_create(&ctx, pixels, WIDTH, HEIGHT, &options, &finder));
     assert_true(bst_streak_finder_shapes(finder) >= 1);
     bst_assert_ok(&ctx, bst_streak_finder_measure(&ctx, finder, 0, false, &found, &quality));
     assert_true(quality > 0.0 && found.count > 1000);
+    /* points are certain to fit worse than the streak, but not than themselves */
+    assert_true(bst_streak_finder_points_fit_worse(finder, quality));
+    bst_assert_ok(&ctx, bst_streak_finder_measure(&ctx, finder, BST_STREAK_FINDER_POINT, false,
+                                                  &points, &quality));
+    assert_true(quality > 0.0 && points.count == 1);
+    assert_true(!bst_streak_finder_points_fit_worse(finder, quality));
     bst_assert_close(found.margin[0], 0.0, 0.0);
     bst_assert_close(found.margin[1], 0.0, 0.0);
     bst_streak_finder_free(finder);
