@@ -90,8 +90,11 @@ static bst_track_figures track_scene(bst_mtt_association association, const clos
         bst_mtt_detection list[CLOSE_DETECTIONS];
         close_expose(&scene, k);
         close_detections(&scene, list);
-        bst_mtt_frame frame = {
-            .tick = k * 1000, .seconds = k, .detections = list, .count = scene.count};
+        bst_mtt_frame frame = {.tick = k * 1000,
+                               .seconds = k,
+                               .detections = list,
+                               .count = scene.count,
+                               .threshold_snr = CLOSE_THRESHOLD};
         double before = processor_s();
         bst_mtt_step(mtt, &frame);
         *spent_s += processor_s() - before;

@@ -124,7 +124,8 @@ static void cross(double rate, uint64_t seed, tally *out) {
         bst_mtt_frame frame = {.tick = (k + 1000) * 1000,
                                .seconds = k + 1000,
                                .detections = list,
-                               .count = scene.count};
+                               .count = scene.count,
+                               .threshold_snr = CLOSE_THRESHOLD};
         bst_mtt_step(mtt, &frame);
         const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &count);
         bst_target_step(&target, &target_params, &cue, frame.seconds, tracks, count);
