@@ -205,7 +205,7 @@ static void start_from(bst_mtt *mtt, int detection, const rate_gate *gate,
                 continue;
             }
             if (!bst_mtt_has_room(mtt, gate->rest, gate->reserve)) {
-                mtt->lost++;
+                mtt->lost += gate->partners == 1; /* not even with its nearest partner */
                 return;
             }
             start_track(mtt, &pool->items[partner], pool, later, gate, frame);
