@@ -1,6 +1,6 @@
 /* Detection probability of faint objects: a discrete Bayesian filter over the SNR of a track's
- * object, fed by its detections and its misses (the idea of an unknown detection profile: Mahler, Vo
- * and Vo, IEEE Trans. SP 59, 2011, section V, here with the measured SNR). */
+ * object, fed by its detections and its misses (the idea of an unknown detection profile: Mahler,
+ * Vo and Vo, IEEE Trans. SP 59, 2011, section V, here with the measured SNR). */
 #include <assert.h>
 
 #include "tracker/mtt/multitarget_internal.h"

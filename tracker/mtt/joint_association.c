@@ -23,11 +23,11 @@ static const double OUTSHINES = 2.0 / 3.0;
 /* Hypotheses less probable than this do not enter the filter, whose mixture would drop them. */
 static const double LEAST_PROBABILITY = 1e-4;
 
-/* Existence probabilities at which a track is confirmed and below which it is deleted. At the first,
- * at most one confirmed track in a hundred is false when it is confirmed. A track is reported while
- * it rather exists than not: the least mean GOSPA. The last two free the slots of hopeless tentative
- * tracks; at the last if more than half of all slots are in use, measured with the scene `clutter`
- * (docs/results/close_objects.md). */
+/* Existence probabilities at which a track is confirmed and below which it is deleted. At the
+ * first, at most one confirmed track in a hundred is false when it is confirmed. A track is
+ * reported while it rather exists than not: the least mean GOSPA. The last two free the slots of
+ * hopeless tentative tracks; at the last if more than half of all slots are in use, measured with
+ * the scene `clutter` (docs/results/close_objects.md). */
 static const double CONFIRMED_EXISTENCE = 0.99, REPORTED_EXISTENCE = 0.5, LEAST_EXISTENCE = 1e-6,
                     LEAST_IN_CROWD = 1e-5;
 

@@ -491,7 +491,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     double floor = m->params.false_alarms_per_frame;
     m->bad_pixels = frame->bad_pixels;
     m->charged = frame->charged;
-    m->threshold_snr = frame->threshold_snr;
+    m->threshold_snr = m->params.association == BST_MTT_PMB ? frame->threshold_snr : 0.0;
     m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
     m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
     bst_mtt_associate(m, frame->partial);

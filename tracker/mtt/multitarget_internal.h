@@ -59,7 +59,7 @@ struct bst_mtt {
     bst_vec3 boresight;     /* of the latest frame; zero vector: unknown */
     int bad_pixels;         /* of the latest frame */
     int charged;            /* charge detections of the latest frame */
-    double threshold_snr;   /* of this frame; 0: unknown */
+    double threshold_snr;   /* of this frame; 0: unknown, no object is taken for faint */
     double clutter;         /* smoothed number of unused detections per frame */
     double clutter_density; /* per steradian, for this frame */
     /* smoothed number of detections without a confirmed track, number of frames averaged, and
