@@ -139,8 +139,9 @@ static inline double bst_mtt_detectable(const bst_mtt *mtt, const bst_mtt_track 
 }
 /* Starts the distribution of a track's SNR: all levels are equally probable. */
 void bst_mtt_start_snr(bst_mtt_track *track);
-/* Updates it by a detection with the light of the track's object alone, or by a miss. */
+/* Updates it by a detection with the light of the track's object alone. */
 void bst_mtt_note_snr(const bst_mtt *mtt, double snr, bst_mtt_track *track);
+/* Updates it by a frame that may have detected the object and did not. */
 void bst_mtt_note_missed(const bst_mtt *mtt, bst_mtt_track *track);
 /* Updates the probability that the object of track t is dark, after the association. */
 void bst_mtt_note_darkness(const bst_mtt *mtt, int t);
