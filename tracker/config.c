@@ -29,12 +29,16 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, process_noise_arcsec_per_s15, "arcsec/s^1.5", 0, 1e4, "0.02",
              "Square root of the power spectral density of the objects' angular acceleration."),
     BST_REAL(C, gate_chi2, "", 1, 1e3, "16", "Gate of a detection, 2 degrees of freedom."),
-    BST_REAL(C, detection_probability, "", 0.01, 0.999, "0.9",
-             "Believed probability that an object in the field is detected."),
+    BST_REAL(
+        C, detection_probability, "", 0.01, 0.999, "0.9",
+        "Believed probability that an object in the field, far above the detection threshold, is "
+        "detected."),
     BST_REAL(C, false_alarms_per_frame, "", 1e-6, 1e6, "1",
              "Least number of false alarms per frame that is believed; more is learnt."),
     BST_INT(C, confirm_hits, "", 2, 100, "3", "Hits that confirm a track (M of N)."),
-    BST_INT(C, confirm_frames, "", 2, 100, "5", "Frames within which they must come (M of N)."),
+    BST_INT(C, confirm_frames, "", 2, 100, "5",
+            "Frames within which they must come (M of N); with pmb the existence probability "
+            "decides."),
     BST_REAL(C, confirm_score, "", 0, 1e3, "12",
              "Least log-likelihood ratio against clutter of a confirmed track."),
     BST_REAL(C, max_rate_arcsec_per_s, "arcsec/s", 0, 1e5, "120",

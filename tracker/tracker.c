@@ -513,7 +513,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
         .cue_before_direction = t->cue_before.direction_gcrf,
         .cue_before_rate_radps = t->cue_before.rate_gcrf_radps,
         .cue_rate_sigma_radps = cue->rate_sigma_radps,
-        .common_rate_sigma_radps = attitude.rate_sigma_radps};
+        .common_rate_sigma_radps = attitude.rate_sigma_radps,
+        .threshold_snr = d->threshold_snr};
     if (t->orbits && bst_tracker_frame_observer(t, input->nav, seconds, &view.observer)) {
         frame.observer = &view.observer;
         frame.sight = bst_tracker_frame_sight_of;

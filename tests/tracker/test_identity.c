@@ -52,13 +52,15 @@ static void open_pair(close_scene *s, double rate, uint64_t seed) {
 /* A cue whose direction errs by an oscillation, as the place along an orbit does, and whose rate is
  * that of its direction: in each frame both have the stated errors and are independent. (With a
  * constant error of the direction and another one of the rate, the cue would know the true rate
- * from two of its directions.) */
-static bst_target_cue make_cue(const close_scene *s, int frame, const double error[4]) {
+ * from two of its directions.) The last two errors are the constant one of the rate beyond what the
+ * cue states, for which the tracker allows by default. */
+static bst_target_cue make_cue(const close_scene *s, int frame, const double error[6]) {
     double x, y, later_x, later_y, d[2], r[2];
     double phase = CUE_RATE_SIGMA_RADPS / CUE_SIGMA_RAD * (frame - CLOSE_FRAMES / 2);
     for (int k = 0; k < 2; k++) {
         d[k] = CUE_SIGMA_RAD * (error[k] * cos(phase) + error[k + 2] * sin(phase));
-        r[k] = CUE_RATE_SIGMA_RADPS * (error[k + 2] * cos(phase) - error[k] * sin(phase));
+        r[k] = CUE_RATE_SIGMA_RADPS * (error[k + 2] * cos(phase) - error[k] * sin(phase)) +
+               target_params.rate_floor_radps * error[k + 4];
     }
     close_place(&s->objects[0], frame, &x, &y);
     close_place(&s->objects[0], frame + 1, &later_x, &later_y);
@@ -109,8 +111,8 @@ static void cross(double rate, uint64_t seed, tally *out) {
     const bst_mtt_params params = close_parameters(BST_MTT_PMB);
     bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
     open_pair(&scene, rate, seed);
-    double error[4];
-    for (int k = 0; k < 4; k++) {
+    double error[6];
+    for (int k = 0; k < 6; k++) {
         error[k] = close_normal(&scene);
     }
     /* from 10 px before to 10 px after the crossing, and no less than a minute */
@@ -124,7 +126,8 @@ static void cross(double rate, uint64_t seed, tally *out) {
         bst_mtt_frame frame = {.tick = (k + 1000) * 1000,
                                .seconds = k + 1000,
                                .detections = list,
-                               .count = scene.count};
+                               .count = scene.count,
+                               .threshold_snr = CLOSE_THRESHOLD};
         bst_mtt_step(mtt, &frame);
         const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &count);
         bst_target_step(&target, &target_params, &cue, frame.seconds, tracks, count);

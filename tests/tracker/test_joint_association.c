@@ -1,5 +1,6 @@
 /* Joint association with existence probabilities, by hand: competition for a detection, a miss, and
  * merged measurements. */
+#include "boresight/rng.h"
 #include "tests/tracker/sky_bench.h"
 #include "tracker/mtt/multitarget_internal.h"
 #include "tracker/mtt/resolution.h"
@@ -279,8 +280,60 @@ static void observed_sky_starts_fewer_tracks(void **state) {
     bst_assert_close(objects, 0.3, 1e-9);
 }
 
+/* Objects of any SNR about the threshold, seen for eight frames: the stated probability that the
+ * ninth detects them is the share that it does. Those far above it are missed as the parameter
+ * says, and so are all where the threshold is not known. */
+static void faint_objects_are_missed_as_stated(void **state) {
+    (void)state;
+    enum { OBJECTS = 20000, FRAMES = 8, BINS = 9 };
+    const double threshold = 5.0;
+    bench *b = start_jointly(18 * AS);
+    bst_mtt *m = b->mtt;
+    m->threshold_snr = threshold;
+    m->params.brightness_random_walk_mag = 0.0;
+    double pd = m->params.detection_probability, stated[BINS] = {0}, found[BINS] = {0};
+    int count[BINS] = {0};
+    bst_rng_key key = bst_rng_make_key(3, 0, "faint", "objects");
+    for (int o = 0; o < OBJECTS; o++) {
+        bst_mtt_track track = {.may_miss = true};
+        double snr = threshold - 1.5 + 7.0 * bst_rng_uniform(key, 0, (uint64_t)o);
+        bst_mtt_start_snr(&track);
+        for (int k = 0; k <= FRAMES; k++) {
+            uint64_t draw = (uint64_t)(o * (FRAMES + 1) + k);
+            double seen = snr + bst_rng_normal(key, 1, draw);
+            bool detected = seen > threshold && bst_rng_uniform(key, 2, draw) < pd;
+            if (k == FRAMES) {
+                double p = bst_mtt_detection_probability(m, &track);
+                int bin = (int)(10.0 * p);
+                stated[bin] += p;
+                found[bin] += detected;
+                count[bin]++;
+            } else if (detected) {
+                bst_mtt_note_snr(m, seen, &track);
+            } else {
+                bst_mtt_note_missed(m, &track);
+            }
+        }
+    }
+    for (int bin = 0; bin < BINS; bin++) {
+        /* 0.02: the levels are 1 apart; and four standard deviations of the sample */
+        double n = count[bin], p = stated[bin] / n, limit = 0.02 + 4.0 * sqrt(p * (1.0 - p) / n);
+        assert_true(count[bin] == 0 || fabs(found[bin] / n - p) < limit);
+    }
+    assert_true(count[1] > 500 && count[4] > 500 && count[8] > 500);
+    bst_mtt_track bright = {.may_miss = true};
+    bst_mtt_start_snr(&bright);
+    bst_mtt_note_snr(m, 30.0, &bright);
+    bst_mtt_note_missed(m, &bright);
+    bst_assert_close(bst_mtt_detection_probability(m, &bright) / pd, 1.0, 1e-4);
+    m->threshold_snr = 0.0;
+    bst_assert_close(bst_mtt_detection_probability(m, &(bst_mtt_track){0}), pd, 1e-15);
+    bst_mtt_free(m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(faint_objects_are_missed_as_stated),
         cmocka_unit_test(two_tracks_compete),
         cmocka_unit_test(misses_lower_existence),
         cmocka_unit_test(merged_measurement_is_inverted),

@@ -36,7 +36,7 @@ int bst_mtt_gate(const bst_mtt *mtt, int t, int *columns, double *costs) {
             continue;
         }
         double cost = -fit.log_likelihood + log(mtt->clutter_density) -
-                      log(params->detection_probability) +
+                      log(bst_mtt_detection_probability(mtt, track)) +
                       bst_mtt_brightness_cost(track, detection);
         int at = count;
         if (count == BST_MTT_CANDIDATES) {

@@ -21,6 +21,7 @@ typedef struct rate_gate {
     int history;  /* number of earlier frames to search */
     bool rest;    /* the new tracks are stationary */
     int partners; /* most tracks that one detection starts */
+    bool shared;  /* a detection may start tracks with more than one partner */
 } rate_gate;
 
 /* Trace of a detection's covariance, rad^2. */
@@ -149,6 +150,9 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
                   pow(1.0 - pd, (double)(pool - mtt->history)) * pd /
                   (mtt->clutter_density * BST_PI * reach * reach);
     track->existence = odds / (1.0 + odds);
+    bst_mtt_start_snr(track);
+    bst_mtt_note_snr(mtt, earlier->snr, track);
+    bst_mtt_note_snr(mtt, later->snr, track);
     bst_mtt_note_place(track, later);
     bst_mtt_start_fixed(mtt, earlier, track);
     bst_mtt_note_fixed(mtt, later, -log(BST_PI * reach * reach), track);
@@ -197,15 +201,15 @@ static void start_from(bst_mtt *mtt, int detection, const rate_gate *gate,
                 break;
             }
             started++;
-            if (gate->partners > 1 && has_started(mtt, &pool->items[partner], later)) {
+            if (gate->shared && has_started(mtt, &pool->items[partner], later)) {
                 continue;
             }
             if (!bst_mtt_has_room(mtt, gate->rest, gate->reserve)) {
-                mtt->lost++;
+                mtt->lost += gate->partners == 1; /* not even with its nearest partner */
                 return;
             }
             start_track(mtt, &pool->items[partner], pool, later, gate, frame);
-            if (gate->partners == 1) {
+            if (!gate->shared) {
                 pool->used[partner] = true;
                 mtt->now.used[detection] = true;
             }
@@ -233,16 +237,18 @@ static void start_pairs(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame
     }
 }
 
-/* Tracks that one detection may start. With existence probabilities every pair does, and later
- * detections decide; in a crowd only the nearest, so that a quarter of the slots is enough. */
-static int most_partners(const bst_mtt *mtt) {
-    int unused = 0;
-    for (int i = 0; i < mtt->now.count; i++) {
-        unused += !mtt->now.used[i];
+/* Starts tracks from pairs in a rate gate. With existence probabilities every pair starts one, and
+ * later detections decide; first those of each detection and its nearest partner in the newest
+ * frame, so that the slots are enough in a crowd. */
+static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, bool from_cue) {
+    if (mtt->params.association == BST_MTT_PMB) {
+        rate_gate nearest = gate;
+        nearest.shared = gate.shared = true;
+        nearest.history = 1;
+        start_pairs(mtt, nearest, frame, from_cue);
+        gate.partners = MOST_PARTNERS;
     }
-    int room = mtt->params.max_tracks / (4 * (unused > 0 ? unused : 1));
-    bool all = mtt->params.association == BST_MTT_PMB && room > 1;
-    return !all ? 1 : room < MOST_PARTNERS ? room : MOST_PARTNERS;
+    start_pairs(mtt, gate, frame, from_cue);
 }
 
 void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
@@ -257,15 +263,14 @@ void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
         rate_gate gate = {
             .gate_radps = 4.0 * frame->cue_rate_sigma_radps + params->cue_rate_margin_radps,
             .history = BST_MTT_HISTORY,
-            .partners = most_partners(mtt)};
-        start_pairs(mtt, gate, frame, true);
+            .partners = 1};
+        start_all(mtt, gate, frame, true);
     }
     /* without the cue the gate is wide: search only the newest frame, and the one before it where
      * every pair may start a track; keep a quarter of the slots free for pairs at the cue's rate */
-    int partners = most_partners(mtt);
     rate_gate gate = {.gate_radps = params->max_rate_radps,
                       .reserve = params->max_tracks / 4,
-                      .history = partners > 1 ? 2 : 1,
-                      .partners = partners};
-    start_pairs(mtt, gate, frame, false);
+                      .history = params->association == BST_MTT_PMB ? 2 : 1,
+                      .partners = 1};
+    start_all(mtt, gate, frame, false);
 }

@@ -23,11 +23,13 @@ static const double OUTSHINES = 2.0 / 3.0;
 /* Hypotheses less probable than this do not enter the filter, whose mixture would drop them. */
 static const double LEAST_PROBABILITY = 1e-4;
 
-/* Existence probabilities at which a track is confirmed and below which it is deleted, confirmed or
- * tentative. At the first, at most one confirmed track in a hundred is false when it is confirmed.
- * A track is reported while it rather exists than not: the least mean GOSPA. The last frees the
- * slots of hopeless ones; M of N ends the others. */
-static const double CONFIRMED_EXISTENCE = 0.99, LEAST_EXISTENCE[2] = {0.5, 1e-7};
+/* Existence probabilities at which a track is confirmed and below which it is deleted. At the
+ * first, at most one confirmed track in a hundred is false when it is confirmed. A track is
+ * reported while it rather exists than not: the least mean GOSPA. The last two free the slots of
+ * hopeless tentative tracks; at the last if more than half of all slots are in use, measured with
+ * the scene `clutter` (docs/results/close_objects.md). */
+static const double CONFIRMED_EXISTENCE = 0.99, REPORTED_EXISTENCE = 0.5, LEAST_EXISTENCE = 1e-6,
+                    LEAST_IN_CROWD = 1e-5;
 
 void bst_mtt_joint_lay_out(bst_mtt_joint *j, int tracks, int detections, bst_arena *arena) {
     j->hypothesis_room = 8 * tracks + 4096;
@@ -134,7 +136,7 @@ static void gate_tracks(bst_mtt *m) {
             if (!firm && !track->at_rest && m->params.merge_rad > 0.0 &&
                 !is_resolved(m, columns[i])) {
                 doubt(m, t, &h,
-                      log(m->clutter_density / m->params.detection_probability) - costs[i]);
+                      log(m->clutter_density / bst_mtt_detection_probability(m, track)) - costs[i]);
             }
             (void)bst_mtt_joint_add(j, t, &h);
         }
@@ -370,8 +372,12 @@ bool bst_mtt_joint_exists(const bst_mtt *m, const bst_mtt_track *track) {
 }
 
 bool bst_mtt_joint_is_gone(const bst_mtt *m, const bst_mtt_track *track) {
-    return m->params.association == BST_MTT_PMB && !track->at_rest && !track->asleep &&
-           track->existence < LEAST_EXISTENCE[track->status == BST_TRACK_TENTATIVE];
+    bool crowd = 2 * (m->track_count - m->rest_count) > m->params.max_tracks;
+    double least = track->status != BST_TRACK_TENTATIVE ? REPORTED_EXISTENCE
+                   : crowd                              ? LEAST_IN_CROWD
+                                                        : LEAST_EXISTENCE;
+    return m->params.association == BST_MTT_PMB && !track->asleep &&
+           (!track->at_rest || track->hits < m->params.confirm_hits) && track->existence < least;
 }
 
 void bst_mtt_joint_drop_duplicates(bst_mtt *m, double same_chi2) {

@@ -16,7 +16,8 @@ static const double SAME_CHI2 = 13.3, NEAR_COSINE = 0.99999;
  * frame's count times gain / (2 - gain) = 1 / 19. */
 static const double CLUTTER_GAIN = 0.1;
 /* A tentative track is deleted after so many windows of N frames in which it was not confirmed. In
- * the first it needs M hits (M of N); its score and chi-square have the second and the third. */
+ * the first it needs M hits (M of N) unless its existence probability decides; its score and
+ * chi-square have the second and the third. */
 enum { TENTATIVE_WINDOWS = 3 };
 
 /* Checks the parameters of the multi-target tracker. */
@@ -313,6 +314,7 @@ static void update_track(bst_mtt *m, int t) {
     if (!outshines && !merged) { /* otherwise the brightness contains another object's light */
         update_brightness(m, track, detection, dt);
         bst_mtt_note_light(track);
+        bst_mtt_note_snr(m, detection->snr, track);
     }
 }
 
@@ -372,6 +374,9 @@ static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool obser
     if (track->status != BST_TRACK_TENTATIVE) {
         return track->may_miss && track->misses_in_row > p->max_misses && track->dark < 0.5;
     }
+    if (p->association == BST_MTT_PMB && (!track->at_rest || track->hits < p->confirm_hits)) {
+        return track->frames >= TENTATIVE_WINDOWS * p->confirm_frames;
+    }
     int allowed = p->confirm_frames - p->confirm_hits;
     return (observed && track->misses_in_row > allowed) ||
            (track->frames >= p->confirm_frames && track->hits < p->confirm_hits) ||
@@ -403,7 +408,7 @@ static void maintain_tracks(bst_mtt *m, const bst_mtt_frame *frame) {
         track->frames += m->observable[t];
         if (track->may_miss && !taken) {
             track->misses_in_row++;
-            track->score += log(1.0 - m->params.detection_probability);
+            track->score += log(1.0 - bst_mtt_detection_probability(m, track));
         }
         bool at_rest = taken && bst_mtt_is_at_rest(m, frame, track);
         if (at_rest && bst_mtt_is_star(m, frame, track)) {
@@ -486,6 +491,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     double floor = m->params.false_alarms_per_frame;
     m->bad_pixels = frame->bad_pixels;
     m->charged = frame->charged;
+    m->threshold_snr = m->params.association == BST_MTT_PMB ? frame->threshold_snr : 0.0;
     m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
     m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
     bst_mtt_associate(m, frame->partial);

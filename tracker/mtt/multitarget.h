@@ -3,8 +3,9 @@
  *
  * Two detections start a tentative track. It is confirmed after M hits in its first N frames if its
  * innovations are consistent and its log-likelihood ratio against clutter is high enough (Blackman
- * and Popoli 1999, section 6.2). Dense clutter therefore requires more hits. Frames in which a
- * track lies outside the field do not count.
+ * and Popoli 1999, section 6.2). Dense clutter therefore requires more hits. With BST_MTT_PMB the
+ * existence probability stands in place of N. Frames in which a track lies outside the field do not
+ * count.
  *
  * Stars that are in no catalogue are recognised by their rate. A track is stationary while its rate
  * is compatible with zero, or while it has not moved by the length of its image, unless the cue
@@ -130,6 +131,10 @@ typedef struct bst_mtt_fixed {
     double log_odds; /* log-likelihood ratio of the track's motion against it */
 } bst_mtt_fixed;
 
+/* Levels of an object's SNR: -1, 0 ... 5 above the detection threshold, the last one stands for all
+ * above it. */
+enum { BST_MTT_SNR_LEVELS = 7 };
+
 typedef struct bst_mtt_track {
     int64_t id;
     bst_track_status status;
@@ -137,7 +142,8 @@ typedef struct bst_mtt_track {
     bst_filter_models models;
     bst_orbit_track orbit; /* valid: `state` is derived from it */
     double v_mag, v_mag_variance;
-    double snr, x_px, y_px; /* latest detection */
+    double snr, x_px, y_px;               /* latest detection */
+    double snr_level[BST_MTT_SNR_LEVELS]; /* probability of each level of its SNR */
     int hits, misses_in_row, merged_in_row;
     /* number of frames since confirmation in which another track was resolved next to it */
     int apart;
@@ -196,7 +202,8 @@ typedef struct bst_mtt_frame {
     /* True if a geometric direction is on the sensor, well inside its edge. NULL: always. */
     bool (*in_field)(const void *user, bst_vec3 direction);
     const void *user;
-    bst_vec3 boresight; /* zero vector: the field does not move; BST_MTT_PMB only */
+    double threshold_snr; /* detection threshold; 0: unknown; BST_MTT_PMB only */
+    bst_vec3 boresight;   /* zero vector: the field does not move; BST_MTT_PMB only */
     /* Cue's direction and rate at the previous frame and at this one: for acceleration feed-forward
      * and for the rate gate of initiation. */
     bool cue_valid, cue_before_valid;

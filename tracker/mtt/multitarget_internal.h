@@ -59,6 +59,7 @@ struct bst_mtt {
     bst_vec3 boresight;     /* of the latest frame; zero vector: unknown */
     int bad_pixels;         /* of the latest frame */
     int charged;            /* charge detections of the latest frame */
+    double threshold_snr;   /* of this frame; 0: unknown, no object is taken for faint */
     double clutter;         /* smoothed number of unused detections per frame */
     double clutter_density; /* per steradian, for this frame */
     /* smoothed number of detections without a confirmed track, number of frames averaged, and
@@ -129,11 +130,19 @@ int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns);
 /* Sets the visibility of predicted track t and whether it is dormant; updates observable (on entry:
  * in the field) and may_miss. */
 void bst_mtt_look(bst_mtt *mtt, int t, const bst_mtt_frame *frame);
+/* Probability that a frame detects an object of the track's SNR. */
+double bst_mtt_detection_probability(const bst_mtt *mtt, const bst_mtt_track *track);
 /* Probability that a frame detects the object of a track, if it exists. */
 static inline double bst_mtt_detectable(const bst_mtt *mtt, const bst_mtt_track *track) {
     bool counts = track->may_miss || track->star;
-    return counts ? mtt->params.detection_probability * (1.0 - track->dark) : 0.0;
+    return counts ? bst_mtt_detection_probability(mtt, track) * (1.0 - track->dark) : 0.0;
 }
+/* Starts the distribution of a track's SNR: all levels are equally probable. */
+void bst_mtt_start_snr(bst_mtt_track *track);
+/* Updates it by a detection with the light of the track's object alone. */
+void bst_mtt_note_snr(const bst_mtt *mtt, double snr, bst_mtt_track *track);
+/* Updates it by a frame that may have detected the object and did not. */
+void bst_mtt_note_missed(const bst_mtt *mtt, bst_mtt_track *track);
 /* Updates the probability that the object of track t is dark, after the association. */
 void bst_mtt_note_darkness(const bst_mtt *mtt, int t);
 /* Updates a track's brightness in full sunlight after a detection, if it is in full sunlight. */

@@ -92,6 +92,7 @@ static void take(bst_mtt *m, int t, int column, bst_vec3 centre, double interval
     m->joint.decided[t] = m->joint.head[t] = -1;
     m->departed_chi2[t] = 0.0;
     m->now.used[column] = true;
+    bst_mtt_start_snr(track); /* so far of the light of both */
     if (isfinite(d->v_mag_sigma)) {
         double floor = m->params.brightness_systematic_mag;
         track->v_mag = d->v_mag;

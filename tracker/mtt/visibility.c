@@ -101,7 +101,9 @@ void bst_mtt_note_darkness(const bst_mtt *m, int t) {
     if (m->detection_of_track[t] >= 0) {
         track->dark = 0.0;
     } else if (track->may_miss) {
-        track->dark /= 1.0 - m->params.detection_probability * (1.0 - track->dark);
+        double pd = bst_mtt_detection_probability(m, track);
+        bst_mtt_note_missed(m, track);
+        track->dark /= 1.0 - pd * (1.0 - track->dark);
     }
 }
 
