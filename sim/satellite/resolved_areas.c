@@ -136,6 +136,25 @@ static void place_facets(const bst_resolved_adding *a) {
     s->placed = sat->joint_count == 0;
 }
 
+/* Places the vertices in the image, as bst_resolved_project.
+ *
+ * Returned:  near  by vertex: linear on a facet, greater for what hides */
+static void place_in_image(const bst_resolved_adding *a, bst_point2 *at, double *near) {
+    const bst_facet_net *net = &a->r->areas.net;
+    const bst_mat3 m = a->image_from_body;
+    const bst_vec3 o = a->view->origin_m, *place = a->pose->vertices;
+    double per_m = a->per_m, x0 = a->r->image.x0, y0 = a->r->image.y0;
+    for (int v = 0; v < net->vertex_count; v++) {
+        bst_vec3 p = place[net->vertex[v]];
+        double depth = o.z + (m.m[2][0] * p.x + m.m[2][1] * p.y + m.m[2][2] * p.z);
+        double by = 1.0 / depth, f = per_m * by;
+        double x = o.x + (m.m[0][0] * p.x + m.m[0][1] * p.y + m.m[0][2] * p.z);
+        double y = o.y + (m.m[1][0] * p.x + m.m[1][1] * p.y + m.m[1][2] * p.z);
+        at[v] = (bst_point2){x * f - x0, y * f - y0};
+        near[v] = o.z * ((o.z - depth) * by);
+    }
+}
+
 /* Places the vertices in the image and finds the facets that face the observer. */
 static bst_status face_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
     bst_resolved_areas *s = &a->r->areas;
@@ -143,12 +162,7 @@ static bst_status face_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
     bst_facet_layers *l = &s->eye;
     BST_TRY(bst_facet_layers_begin(ctx, l, &s->net, a->r->image.width, a->r->image.height));
     l->same = BST_RESOLVED_SAME * sat->radius_m;
-    double origin_m = a->view->origin_m.z;
-    for (int v = 0; v < s->net.vertex_count; v++) {
-        double depth_m;
-        l->at[v] = bst_resolved_project(a, a->pose->vertices[s->net.vertex[v]], &depth_m);
-        l->near[v] = origin_m * ((origin_m - depth_m) / depth_m);
-    }
+    place_in_image(a, l->at, l->near);
     for (int f = 0; f < sat->facet_count; f++) {
         l->facing[f] = bst_vec3_dot(s->planes[f].normal, a->eye_m) > s->planes[f].offset_m;
     }
@@ -156,29 +170,70 @@ static bst_status face_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
     return BST_OK;
 }
 
+/* Sunlight of a Lambertian material per cell, over the cosine of incidence: seen from any side. 0:
+ * it is not the same for all directions. */
+static double even_sun(const bst_resolved_adding *a, int material) {
+    const bst_material *m = &a->r->satellite->materials[material];
+    bool even = m->brdf.model == BST_BRDF_LAMBERT && bst_sun_disc_nodes(m, &a->r->disc) == 1;
+    double gain = even ? a->light->gain[material].sun : 0.0;
+    return gain * m->scale * bst_brdf_value(&m->brdf, 1.0, 1.0, 1.0) / (a->per_m * a->per_m);
+}
+
+/* Light of a facet in sight by bst_resolved_shade, or the same light with less work.
+ *
+ * Given:     even  even_sun of its material
+ *            in    cosine of the Sun's incidence */
+static bst_resolved_shading shade_facet(const bst_resolved_adding *a, int facet, double even,
+                                        double in) {
+    static const double EDGE_ON = 1e-4; /* cosine of the angle of sight: dimmed below it */
+    const bst_resolved_areas *s = &a->r->areas;
+    int material = a->r->satellite->facets[facet].material;
+    bst_vec3 normal = s->planes[facet].normal;
+    if (even > 0.0 && in > 1e-9) {
+        bst_vec3 way = bst_vec3_sub(a->eye_m, s->middles[facet]);
+        double out = bst_vec3_dot(normal, way);
+        if (out > 0.0 && out * out > EDGE_ON * EDGE_ON * bst_vec3_dot(way, way)) {
+            double uniform = a->light->gain[material].emission / (a->per_m * a->per_m);
+            return (bst_resolved_shading){even * (in < 1.0 ? in : 1.0), 0.0, uniform, {0.0, 0.0}};
+        }
+    }
+    return bst_resolved_shade(a, material, s->middles[facet], normal);
+}
+
 /* Light of the facets that face the observer, if nothing hides them from it. Those with light are
  * wanted. */
 static void shade(const bst_resolved_adding *a) {
     bst_resolved_areas *s = &a->r->areas;
     const bst_satellite *sat = a->r->satellite;
+    bst_resolved_shading most = {0.0, 0.0, 0.0, {0.0, 0.0}};
+    int known = -1; /* material of `even` */
+    double even = 0.0, brightest = 0.0;
     for (int f = 0; f < sat->facet_count; f++) {
         s->wanted[f] = 0;
         if (!s->eye.facing[f]) {
             continue;
         }
-        bst_vec3 normal = s->planes[f].normal;
         bst_resolved_shading light = {0.0, 0.0, 0.0, {0.0, 0.0}};
         int material = sat->facets[f].material;
-        if (bst_vec3_dot(normal, a->light->sun) > 0.0 || a->earth ||
-            a->light->gain[material].emission > 0.0) {
-            light = bst_resolved_shade(a, material, s->middles[f], normal);
+        double in = bst_vec3_dot(s->planes[f].normal, a->light->sun);
+        if (material != known) {
+            known = material;
+            even = a->earth ? 0.0 : even_sun(a, material);
         }
+        if (in > 0.0 || a->earth || a->light->gain[material].emission > 0.0) {
+            light = shade_facet(a, f, even, in);
+        }
+        double sum = light.uniform + light.sun + light.earth;
         s->even[f] = light.uniform;
         s->from[0][f] = light.sun;
         s->from[1][f] = light.earth;
-        s->wanted[f] = light.uniform + light.sun + light.earth > 0.0;
-        bst_resolved_note_light(a, &light, false);
+        s->wanted[f] = sum > 0.0;
+        if (sum > brightest) {
+            brightest = sum;
+            most = light;
+        }
     }
+    bst_resolved_note_light(a, &most, false);
 }
 
 /* View from a light: a place in the body frame is at middle + per_m times its x and y. */
@@ -210,11 +265,12 @@ static bst_status look_from_light(bst_ctx *ctx, const bst_resolved_adding *a, in
     double least = n == 0 ? 0.0 : EARTH_LOW;
     BST_TRY(bst_facet_layers_begin(ctx, l, &s->net, v->side, v->side));
     l->same = BST_RESOLVED_SAME * sat->radius_m;
+    const light_view axes = *v; /* in registers */
     for (int i = 0; i < s->net.vertex_count; i++) {
         bst_vec3 p = a->pose->vertices[s->net.vertex[i]];
-        l->at[i] = (bst_point2){v->middle + v->per_m * bst_vec3_dot(p, v->x),
-                                v->middle + v->per_m * bst_vec3_dot(p, v->y)};
-        l->near[i] = bst_vec3_dot(p, v->z);
+        l->at[i] = (bst_point2){axes.middle + axes.per_m * bst_vec3_dot(p, axes.x),
+                                axes.middle + axes.per_m * bst_vec3_dot(p, axes.y)};
+        l->near[i] = bst_vec3_dot(p, axes.z);
     }
     for (int f = 0; f < sat->facet_count; f++) {
         double in = bst_vec3_dot(s->planes[f].normal, v->z);
