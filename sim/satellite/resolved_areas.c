@@ -136,6 +136,18 @@ static void place_facets(const bst_resolved_adding *a) {
     s->placed = sat->joint_count == 0;
 }
 
+/* Most cells per metre between two places of the body: a place at (x, y, z) is at x / z and y / z.
+ * 0: not known. */
+static double cells_per_m(const bst_resolved_adding *a) {
+    bst_vec3 o = a->view->origin_m;
+    double radius_m = a->r->satellite->radius_m, nearest_m = o.z - radius_m;
+    if (!(nearest_m > 0.0)) {
+        return 0.0;
+    }
+    double tangent = (hypot(o.x, o.y) + radius_m) / nearest_m;
+    return a->per_m / nearest_m * sqrt(1.0 + tangent * tangent);
+}
+
 /* Places the vertices in the image, as bst_resolved_project.
  *
  * Returned:  near  by vertex: linear on a facet, greater for what hides */
@@ -162,6 +174,7 @@ static bst_status face_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
     bst_facet_layers *l = &s->eye;
     BST_TRY(bst_facet_layers_begin(ctx, l, &s->net, a->r->image.width, a->r->image.height));
     l->same = BST_RESOLVED_SAME * sat->radius_m;
+    l->cells_per_m = cells_per_m(a);
     place_in_image(a, l->at, l->near);
     for (int f = 0; f < sat->facet_count; f++) {
         l->facing[f] = bst_vec3_dot(s->planes[f].normal, a->eye_m) > s->planes[f].offset_m;
@@ -265,6 +278,7 @@ static bst_status look_from_light(bst_ctx *ctx, const bst_resolved_adding *a, in
     double least = n == 0 ? 0.0 : EARTH_LOW;
     BST_TRY(bst_facet_layers_begin(ctx, l, &s->net, v->side, v->side));
     l->same = BST_RESOLVED_SAME * sat->radius_m;
+    l->cells_per_m = v->per_m;
     const light_view axes = *v; /* in registers */
     for (int i = 0; i < s->net.vertex_count; i++) {
         bst_vec3 p = a->pose->vertices[s->net.vertex[i]];
