@@ -363,7 +363,7 @@ static inline bool may_reach(const bst_facet_layers *l, int f, double most_m, bo
         all &= bits;
     }
     *off = (any & OFF) != 0;
-    return !(all & OFF) && ((any & ABOUT) || l->net->size_m[f] > most_m);
+    return !(all & OFF) && ((any & ABOUT) || (double)l->net->size_m[f] > most_m);
 }
 
 bool bst_facet_layers_is_within(const bst_facet_layers *l, int facet) {

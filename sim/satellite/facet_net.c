@@ -12,6 +12,7 @@ void bst_facet_net_free(bst_facet_net *net) {
     free(net->edges);
     free(net->apart);
     free(net->size_m);
+    free(net->material);
     *net = (bst_facet_net){.vertex_count = 0};
 }
 
@@ -165,7 +166,7 @@ static void join(const bst_satellite *s, work *w, bst_facet_net *net) {
     }
 }
 
-/* Finds the sizes of the facets. */
+/* Finds the sizes of the facets, and lists their materials. */
 static void measure(const bst_satellite *s, bst_facet_net *net) {
     for (int f = 0; f < s->facet_count; f++) {
         double most = 0.0; /* squared */
@@ -175,7 +176,8 @@ static void measure(const bst_satellite *s, bst_facet_net *net) {
                 most = fmax(most, bst_vec3_dot(way, way));
             }
         }
-        net->size_m[f] = sqrt(most);
+        net->size_m[f] = nextafterf((float)sqrt(most), INFINITY);
+        net->material[f] = s->facets[f].material;
     }
 }
 
@@ -188,7 +190,8 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
                            .beside = calloc(corners, sizeof *out->beside),
                            .edges = calloc(corners, sizeof *out->edges),
                            .apart = calloc((size_t)s->facet_count + 1, sizeof *out->apart),
-                           .size_m = calloc((size_t)s->facet_count + 1, sizeof *out->size_m)};
+                           .size_m = calloc((size_t)s->facet_count + 1, sizeof *out->size_m),
+                           .material = calloc((size_t)s->facet_count + 1, sizeof *out->material)};
     work w = {.placed = calloc(vertices, sizeof *w.placed),
               .first = calloc(vertices, sizeof *w.first),
               .number = calloc(vertices, sizeof *w.number),
@@ -197,7 +200,8 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
               .sides = calloc(corners, sizeof *w.sides)};
     bst_status status = BST_OK;
     if (!out->vertex || !out->first || !out->corner || !out->beside || !out->edges || !out->apart ||
-        !out->size_m || !w.placed || !w.first || !w.number || !w.facet || !w.partner || !w.sides) {
+        !out->size_m || !out->material || !w.placed || !w.first || !w.number || !w.facet ||
+        !w.partner || !w.sides) {
         status =
             bst_fail(ctx, BST_ERR_MEMORY, "no memory for the edges of %d facets", s->facet_count);
     } else {
