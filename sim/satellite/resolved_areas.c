@@ -284,10 +284,27 @@ static void keep(bst_resolved_areas *s) {
     }
 }
 
-void bst_resolved_join_light(bst_resolved *to, bst_resolved *from) {
-    add_kept(&to->areas);
-    add_kept(&from->areas);
-    bst_area_sums_add(&to->areas.sums, &from->areas.sums);
+void bst_resolved_settle_light(bst_resolved *r) {
+    add_kept(&r->areas);
+}
+
+/* Sums that are joined. */
+typedef struct joining {
+    bst_area_sums *to;
+    const bst_area_sums *from;
+} joining;
+
+/* Callback of the loop over rows. */
+static void join_rows(void *user, int begin, int end) {
+    const joining *j = user;
+    bst_area_sums_add(j->to, j->from, begin, end);
+}
+
+void bst_resolved_join_light(bst_resolved *to, const bst_resolved *from, bst_parallel *pool) {
+    enum { ROWS = 32 };
+    joining rows = {&to->areas.sums, &from->areas.sums};
+    assert(to->areas.kept_count == 0 && from->areas.kept_count == 0);
+    bst_parallel_for(pool, to->image.height, ROWS, join_rows, &rows);
     to->image.surface_light = fmax(to->image.surface_light, from->image.surface_light);
     for (int i = 0; i < BST_RESOLVED_PENUMBRAE; i++) {
         bst_resolved_penumbra *p = &to->image.penumbrae[i];
