@@ -201,6 +201,7 @@ static bst_status draw_group(run *r, int g) {
     for (int k = g; k < d->count; k += BST_BODY_GROUPS) {
         BST_TRY(d->draw(ctx, d->user, k, pose, image));
     }
+    bst_resolved_settle_light(image);
     return BST_OK;
 }
 
@@ -222,7 +223,7 @@ bst_status bst_body_poses_draw(bst_ctx *ctx, bst_body_poses *poses, const bst_bo
             return bst_fail(ctx, r.status[g], "%s", r.ctx[g].message);
         }
         if (g > 0) {
-            bst_resolved_join_light(d->image, poses->image[g - 1]);
+            bst_resolved_join_light(d->image, poses->image[g - 1], d->pool);
         }
     }
     bst_resolved_end_light(d->image, d->scale_rad);

@@ -131,7 +131,8 @@ static widths widths_of(const moments *m) {
     double x = m->x / m->light, y = m->y / m->light;
     double xx = larger(m->xx / m->light - x * x, 0.0), yy = larger(m->yy / m->light - y * y, 0.0);
     double xy = m->xy / m->light - x * y;
-    return (widths){0.5 * (xx + yy), 0.5 * hypot(xx - yy, 2.0 * xy), xx - yy, 2.0 * xy};
+    double across = xx - yy, along = 2.0 * xy;
+    return (widths){0.5 * (xx + yy), 0.5 * sqrt(across * across + along * along), across, along};
 }
 
 /* Error of a square as one node, as a pair along its longest axis that has its second moments, or
@@ -239,7 +240,7 @@ static double contrast_of(const run *r, int x, int y) {
     for (int v = y - 1; v <= y + 1; v++) {
         for (int u = x - 1; u <= x + 1; u++) {
             bool inside = u >= 0 && v >= 0 && u < r->squares_x && v < r->squares_y;
-            most = fmax(most, fabs((inside ? r->squares[v * r->squares_x + u] : 0.0) - own));
+            most = larger(most, fabs((inside ? r->squares[v * r->squares_x + u] : 0.0) - own));
         }
     }
     return own > 0.0 ? fmin(most / own, 1.0) : 0.0;

@@ -289,10 +289,11 @@ void bst_area_sums_polygon(bst_area_sums *s, const bst_point2 *p, int count, dou
     }
 }
 
-void bst_area_sums_add(bst_area_sums *to, const bst_area_sums *from) {
+void bst_area_sums_add(bst_area_sums *to, const bst_area_sums *from, int first, int end) {
     assert(to->width == from->width && to->height == from->height);
-    size_t count = ((size_t)to->width + 1) * (size_t)to->height;
-    for (size_t i = 0; i < count; i++) {
+    size_t stride = (size_t)to->width + 1, start = stride * (size_t)first;
+    size_t count = stride * (size_t)end;
+    for (size_t i = start; i < count; i++) {
         bst_area_cell *c = &to->cells[i];
         const bst_area_cell *d = &from->cells[i];
         c->row_light += d->row_light;
@@ -301,7 +302,7 @@ void bst_area_sums_add(bst_area_sums *to, const bst_area_sums *from) {
         c->x += d->x;
         c->y += d->y;
     }
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = start; i < count; i++) {
         bst_area_second *c = &to->second[i];
         const bst_area_second *d = &from->second[i];
         c->row_yy += d->row_yy;

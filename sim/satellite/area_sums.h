@@ -46,8 +46,8 @@ void bst_area_sums_faint_edge(bst_area_sums *sums, bst_point2 a, bst_point2 b, d
 /* Adds a polygon, counter-clockwise. */
 void bst_area_sums_polygon(bst_area_sums *sums, const bst_point2 *corners, int count, double light);
 
-/* Adds other sums of the same size. */
-void bst_area_sums_add(bst_area_sums *to, const bst_area_sums *from);
+/* Adds other sums of the same size, from one row on and before another. */
+void bst_area_sums_add(bst_area_sums *to, const bst_area_sums *from, int first, int end);
 
 /* Sets light and moments of an image of the same size, with the second ones.
  *

@@ -227,7 +227,8 @@ static bst_layers_seen look_within_borders(bst_facet_layers *l, const bst_layers
             return apart ? bst_facet_layers_split(l, box, own, plane) : seen;
         }
     }
-    bool clear = cross == BST_LAYERS_CROSS_NONE && apart == BST_NET_FREE && l->within[box->facet];
+    bool clear = cross == BST_LAYERS_CROSS_NONE && apart == BST_NET_FREE &&
+                 bst_facet_layers_is_within(l, box->facet);
     if (clear) {
         seen = visibility_of_neighbours(l, box->facet);
     }

@@ -21,7 +21,8 @@ void bst_facet_layers_free(bst_facet_layers *l) {
     free(l->known);
     free(l->crowded);
     free(l->vertex_bins);
-    free(l->within);
+    free(l->off);
+    free(l->about);
     free(l->boxes);
     free(l->bins);
     free(l->order);
@@ -52,14 +53,14 @@ static bst_status reserve_facets(bst_ctx *ctx, bst_facet_layers *l, const bst_fa
     l->doubtful = calloc(facets, sizeof *l->doubtful);
     l->known = calloc(facets, sizeof *l->known);
     l->vertex_bins = calloc(vertices, sizeof *l->vertex_bins);
-    l->within = calloc(facets, sizeof *l->within);
+    l->off = calloc(vertices, sizeof *l->off);
     l->boxes = calloc(facets, sizeof *l->boxes);
     l->bins = calloc(facets, sizeof *l->bins);
     l->order = calloc(facets, sizeof *l->order);
     l->seen = calloc(facets, sizeof *l->seen);
     l->chosen = calloc(facets, sizeof *l->chosen);
     if (!l->at || !l->near || !l->facing || !l->doubtful || !l->known || !l->vertex_bins ||
-        !l->within || !l->boxes || !l->bins || !l->order || !l->seen || !l->chosen) {
+        !l->off || !l->boxes || !l->bins || !l->order || !l->seen || !l->chosen) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the view of %d facets",
                         net->satellite->facet_count);
     }
@@ -91,13 +92,16 @@ bst_status bst_facet_layers_begin(bst_ctx *ctx, bst_facet_layers *l, const bst_f
         free(l->border_first);
         free(l->needed);
         free(l->marked);
+        free(l->about);
         l->crowded = malloc(cells * sizeof *l->crowded);
         l->bin_first = malloc(bins * sizeof *l->bin_first);
         l->border_first = malloc(bins * sizeof *l->border_first);
         l->needed = malloc(bins * sizeof *l->needed);
         l->marked = malloc(bins * sizeof *l->marked);
+        l->about = malloc(bins * sizeof *l->about);
         l->cell_capacity = cells;
-        if (!l->crowded || !l->bin_first || !l->border_first || !l->needed || !l->marked) {
+        if (!l->crowded || !l->bin_first || !l->border_first || !l->needed || !l->marked ||
+            !l->about) {
             l->cell_capacity = 0;
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a view of %d x %d cells", width,
                             height);
@@ -296,8 +300,9 @@ static void make_box(bst_facet_layers *l, int f) {
                                    (uint16_t)((l->level_from - far + l->same) * l->level_per)};
 }
 
-/* Sides of the grid that a vertex is beyond. */
-enum { OFF_LEFT = 1, OFF_RIGHT = 2, OFF_UP = 4, OFF_DOWN = 8 };
+/* Bits of `off`: sides of the grid that a vertex is beyond, and that its bin is about one that is
+ * looked for. */
+enum { OFF_LEFT = 1, OFF_RIGHT = 2, OFF_UP = 4, OFF_DOWN = 8, OFF = 15, ABOUT = 16 };
 
 /* Finds the bins of the vertices, and the range of nearness. */
 static void place_vertices(bst_facet_layers *l) {
@@ -306,9 +311,9 @@ static void place_vertices(bst_facet_layers *l) {
         bst_point2 p = l->at[v];
         l->vertex_bins[v] =
             (bst_layers_bin_of){bst_layers_cell_of(p.x, l->width) / BST_LAYERS_BIN,
-                                bst_layers_cell_of(p.y, l->height) / BST_LAYERS_BIN,
-                                (p.x >= 0.0 ? 0 : OFF_LEFT) | (p.x < width ? 0 : OFF_RIGHT) |
-                                    (p.y >= 0.0 ? 0 : OFF_UP) | (p.y < height ? 0 : OFF_DOWN)};
+                                bst_layers_cell_of(p.y, l->height) / BST_LAYERS_BIN};
+        l->off[v] = (uint8_t)((p.x >= 0.0 ? 0 : OFF_LEFT) | (p.x < width ? 0 : OFF_RIGHT) |
+                              (p.y >= 0.0 ? 0 : OFF_UP) | (p.y < height ? 0 : OFF_DOWN));
         least = l->near[v] < least ? l->near[v] : least;
         most = l->near[v] > most ? l->near[v] : most;
     }
@@ -316,37 +321,73 @@ static void place_vertices(bst_facet_layers *l) {
     l->level_per = (LEVELS - 1) / fmax(most - least + 2.0 * l->same, 1e-300);
 }
 
-/* Finds the bins of the facets that face the view, lists those that are not off the grid, and notes
- * which are within it. */
-static void find_bins(bst_facet_layers *l) {
-    int facets = l->net->satellite->facet_count;
-    l->order_count = 0;
-    for (int f = 0; f < facets; f++) {
-        if (!l->facing[f]) {
-            continue;
-        }
-        const int *corner = l->net->corner + l->net->first[f];
-        const int *end = l->net->corner + l->net->first[f + 1];
-        bst_layers_bin_of low = l->vertex_bins[*corner], high = low;
-        int any = low.off, all = low.off;
-        for (corner++; corner < end; corner++) {
-            bst_layers_bin_of b = l->vertex_bins[*corner];
-            low.x = b.x < low.x ? b.x : low.x;
-            low.y = b.y < low.y ? b.y : low.y;
-            high.x = b.x > high.x ? b.x : high.x;
-            high.y = b.y > high.y ? b.y : high.y;
-            any |= b.off;
-            all &= b.off;
-        }
-        if (!all) {
-            l->bins[f][0] = low.x;
-            l->bins[f][1] = high.x;
-            l->bins[f][2] = low.y;
-            l->bins[f][3] = high.y;
-            l->within[f] = any == 0;
-            l->order[l->order_count++] = f;
+/* Notes which vertices are in a bin that is marked, or beside one. */
+static void look_about(bst_facet_layers *l, const uint8_t *marks) {
+    memset(l->about, 0, (size_t)l->bins_x * (size_t)l->bins_y);
+    for (int j = 0; j < l->bins_y; j++) {
+        for (int i = 0; i < l->bins_x; i++) {
+            if (!marks[j * l->bins_x + i]) {
+                continue;
+            }
+            int low = i > 0 ? i - 1 : i, high = i + 1 < l->bins_x ? i + 1 : i;
+            for (int row = j > 0 ? j - 1 : j; row <= j + 1 && row < l->bins_y; row++) {
+                for (int n = low; n <= high; n++) {
+                    l->about[row * l->bins_x + n] = ABOUT;
+                }
+            }
         }
     }
+    for (int v = 0; v < l->net->vertex_count; v++) {
+        int about = l->about[l->vertex_bins[v].y * l->bins_x + l->vertex_bins[v].x];
+        l->off[v] = (uint8_t)((l->off[v] & OFF) | about);
+    }
+}
+
+/* Size of a facet up to which none of its places is in a bin that is not beside that of a corner:
+ * the farthest one from all corners of a triangle is the middle of one of equal sides, 1 / sqrt(3)
+ * of a side; a polygon of more is of triangles. */
+static double small_m(const bst_facet_layers *l) {
+    static const double ROUNDING = 1e-6;
+    return l->cells_per_m > 0.0 ? (sqrt(3.0) - ROUNDING) * BST_LAYERS_BIN / l->cells_per_m : -1.0;
+}
+
+/* True if a facet may reach a bin that is looked for. *off: it is beyond the grid, perhaps in part.
+ */
+static inline bool may_reach(const bst_facet_layers *l, int f, double most_m, bool *off) {
+    const int *corner = l->net->corner + l->net->first[f];
+    const int *end = l->net->corner + l->net->first[f + 1];
+    int any = l->off[*corner], all = any;
+    for (corner++; corner < end; corner++) {
+        int bits = l->off[*corner];
+        any |= bits;
+        all &= bits;
+    }
+    *off = (any & OFF) != 0;
+    return !(all & OFF) && ((any & ABOUT) || (double)l->net->size_m[f] > most_m);
+}
+
+bool bst_facet_layers_is_within(const bst_facet_layers *l, int facet) {
+    bool off;
+    (void)may_reach(l, facet, 0.0, &off);
+    return !off;
+}
+
+/* Finds the bins of a facet. */
+static void find_bins(bst_facet_layers *l, int f) {
+    const int *corner = l->net->corner + l->net->first[f];
+    const int *end = l->net->corner + l->net->first[f + 1];
+    bst_layers_bin_of low = l->vertex_bins[*corner], high = low;
+    for (corner++; corner < end; corner++) {
+        bst_layers_bin_of b = l->vertex_bins[*corner];
+        low.x = b.x < low.x ? b.x : low.x;
+        low.y = b.y < low.y ? b.y : low.y;
+        high.x = b.x > high.x ? b.x : high.x;
+        high.y = b.y > high.y ? b.y : high.y;
+    }
+    l->bins[f][0] = low.x;
+    l->bins[f][1] = high.x;
+    l->bins[f][2] = low.y;
+    l->bins[f][3] = high.y;
 }
 
 /* True if one of the bins of a facet is marked. */
@@ -363,15 +404,23 @@ static bool any_bin(const bst_facet_layers *l, int facet, const uint8_t *marks) 
 
 /* Orders the facets of the bins that are needed by their nearest level. */
 static void order_facets(bst_facet_layers *l) {
-    int first[LEVELS + 1] = {0}, count = 0;
-    for (int n = 0; n < l->order_count; n++) {
-        if (any_bin(l, l->order[n], l->needed)) {
-            if (!l->doubtful[l->order[n]]) {
-                make_box(l, l->order[n]);
-            }
-            l->chosen[count++] = l->order[n];
-            first[l->boxes[l->order[n]].nearest + 1]++;
+    int first[LEVELS + 1] = {0}, count = 0, facets = l->net->satellite->facet_count;
+    double most_m = small_m(l);
+    look_about(l, l->needed);
+    for (int f = 0; f < facets; f++) {
+        bool off;
+        if (!l->facing[f] || !may_reach(l, f, most_m, &off)) {
+            continue;
         }
+        if (!l->doubtful[f]) {
+            find_bins(l, f);
+            if (!any_bin(l, f, l->needed)) {
+                continue;
+            }
+            make_box(l, f);
+        }
+        l->chosen[count++] = f;
+        first[l->boxes[f].nearest + 1]++;
     }
     for (int i = 0; i < LEVELS; i++) {
         first[i + 1] += first[i];
@@ -450,22 +499,30 @@ static bst_status fill_bins(bst_ctx *ctx, bst_facet_layers *l) {
 
 bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_t *wanted) {
     bool any = false;
+    int facets = l->net->satellite->facet_count;
+    double most_m = small_m(l);
     BST_TRY(mark_cells(ctx, l));
     place_vertices(l);
-    find_bins(l);
+    look_about(l, l->marked);
     memset(l->needed, 0, (size_t)l->bins_x * (size_t)l->bins_y);
-    memset(l->doubtful, 0, (size_t)l->net->satellite->facet_count);
-    memset(l->known, 0, (size_t)l->net->satellite->facet_count);
-    for (int n = 0; n < l->order_count; n++) {
-        int f = l->order[n];
-        if (wanted[f] && any_bin(l, f, l->marked)) {
-            make_box(l, f);
-            l->doubtful[f] = (uint8_t)marks_of(l, &l->boxes[f]);
+    memset(l->doubtful, 0, (size_t)facets);
+    memset(l->known, 0, (size_t)facets);
+    for (int f = 0; f < facets; f++) {
+        if (!wanted[f] || !l->facing[f]) {
+            continue;
+        }
+        bool off;
+        if (may_reach(l, f, most_m, &off)) {
+            find_bins(l, f);
+            if (any_bin(l, f, l->marked)) {
+                make_box(l, f);
+                l->doubtful[f] = (uint8_t)marks_of(l, &l->boxes[f]);
+            }
         }
         if (l->doubtful[f]) {
             need_bins(l, f);
             any = true;
-        } else if (wanted[f] && l->net->apart[f] == BST_NET_FREE && l->within[f]) {
+        } else if (!off && l->net->apart[f] == BST_NET_FREE) {
             l->known[f] = BST_LAYERS_KNOWN_ALL;
         }
     }

@@ -17,9 +17,9 @@ typedef struct bst_layers_box {
     uint16_t nearest, farthest;
 } bst_layers_box;
 
-/* Bin of a vertex, within the grid; off: sides of the grid that it is beyond, as bits. */
+/* Bin of a vertex, within the grid. */
 typedef struct bst_layers_bin_of {
-    int x, y, off;
+    int x, y;
 } bst_layers_bin_of;
 
 /* Where the border of a layer crosses the middle of a row. */
@@ -41,25 +41,28 @@ typedef struct bst_layers_border {
  * bst_facet_layers_find: */
 typedef struct bst_facet_layers {
     const bst_facet_net *net;
-    bst_point2 *at;    /* by vertex of the net: place in the view, in cells of a grid */
-    double *near;      /* by vertex: linear on a facet, greater for what hides */
-    uint8_t *facing;   /* by facet, and 0 for one more; of those, corners are clockwise in the view
-                          with x to the right and y up */
-    int width, height; /* of the grid */
-    double same;       /* differences of `near` that are none */
+    bst_point2 *at;     /* by vertex of the net: place in the view, in cells of a grid */
+    double *near;       /* by vertex: linear on a facet, greater for what hides */
+    uint8_t *facing;    /* by facet, and 0 for one more; of those, corners are clockwise in the view
+                           with x to the right and y up */
+    int width, height;  /* of the grid */
+    double same;        /* differences of `near` that are none */
+    double cells_per_m; /* no two places of a facet are farther apart in the view; 0: not known */
     /* results */
     uint8_t
         *doubtful; /* by facet: others may hide it; 1: all or nothing, but for planes that cross */
     /* work memory */
-    uint8_t *within;                /* by facet in `order`: all of it is on the grid */
     bst_layers_bin_of *vertex_bins; /* by vertex of the net */
+    uint8_t *off;                   /* likewise: sides of the grid that it is beyond, as bits, and
+                                       whether it is about a bin that is looked for */
+    uint8_t *about;                 /* by bin: it or one beside it is looked for */
     uint8_t *known;        /* by facet: what is seen of it, and 0 for one more; see facet_cut.c */
     uint8_t *crowded;      /* by cell: something may be hidden there */
     bst_layers_box *boxes; /* by facet that faces the view, of those that are looked at */
     int (*bins)[4];        /* likewise: first and last column, first and last row of its
                               bins */
-    int *order;            /* facets that face the view; of those in the bins that are
-                              needed, the nearest first */
+    int *order;            /* facets that face the view in the bins that are needed, the nearest
+                              first */
     int *chosen;           /* facets in these bins */
     bst_layers_crossing *crossings; /* of borders with the middles of rows, in order */
     bst_layers_crossing *sorted;    /* room for them */

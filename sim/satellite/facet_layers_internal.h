@@ -96,6 +96,8 @@ typedef enum bst_layers_seen {
 bst_layers_seen bst_facet_layers_point_visibility(const bst_facet_layers *layers,
                                                   const bst_layers_box *box, const double plane[3],
                                                   bst_point2 place);
+/* True if all of a facet is on the grid. */
+bool bst_facet_layers_is_within(const bst_facet_layers *layers, int facet);
 /* True if a facet covers a place; its border does. */
 bool bst_facet_layers_covers(const bst_facet_layers *layers, int facet, bst_point2 place);
 /* Splits a facet that no other one crosses along the borders before it (facet_split.c). Unknown:

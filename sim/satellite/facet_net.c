@@ -11,6 +11,8 @@ void bst_facet_net_free(bst_facet_net *net) {
     free(net->beside);
     free(net->edges);
     free(net->apart);
+    free(net->size_m);
+    free(net->material);
     *net = (bst_facet_net){.vertex_count = 0};
 }
 
@@ -164,6 +166,21 @@ static void join(const bst_satellite *s, work *w, bst_facet_net *net) {
     }
 }
 
+/* Finds the sizes of the facets, and lists their materials. */
+static void measure(const bst_satellite *s, bst_facet_net *net) {
+    for (int f = 0; f < s->facet_count; f++) {
+        double most = 0.0; /* squared */
+        for (int i = net->first[f]; i < net->first[f + 1]; i++) {
+            for (int k = i + 1; k < net->first[f + 1]; k++) {
+                bst_vec3 way = bst_vec3_sub(s->vertices[s->corner[k]], s->vertices[s->corner[i]]);
+                most = fmax(most, bst_vec3_dot(way, way));
+            }
+        }
+        net->size_m[f] = nextafterf((float)sqrt(most), INFINITY);
+        net->material[f] = s->facets[f].material;
+    }
+}
+
 bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_net *out) {
     size_t vertices = (size_t)s->vertex_count + 1, corners = (size_t)s->corner_count + 1;
     *out = (bst_facet_net){.satellite = s,
@@ -172,7 +189,9 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
                            .corner = calloc(corners, sizeof *out->corner),
                            .beside = calloc(corners, sizeof *out->beside),
                            .edges = calloc(corners, sizeof *out->edges),
-                           .apart = calloc((size_t)s->facet_count + 1, sizeof *out->apart)};
+                           .apart = calloc((size_t)s->facet_count + 1, sizeof *out->apart),
+                           .size_m = calloc((size_t)s->facet_count + 1, sizeof *out->size_m),
+                           .material = calloc((size_t)s->facet_count + 1, sizeof *out->material)};
     work w = {.placed = calloc(vertices, sizeof *w.placed),
               .first = calloc(vertices, sizeof *w.first),
               .number = calloc(vertices, sizeof *w.number),
@@ -181,12 +200,14 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
               .sides = calloc(corners, sizeof *w.sides)};
     bst_status status = BST_OK;
     if (!out->vertex || !out->first || !out->corner || !out->beside || !out->edges || !out->apart ||
-        !w.placed || !w.first || !w.number || !w.facet || !w.partner || !w.sides) {
+        !out->size_m || !out->material || !w.placed || !w.first || !w.number || !w.facet ||
+        !w.partner || !w.sides) {
         status =
             bst_fail(ctx, BST_ERR_MEMORY, "no memory for the edges of %d facets", s->facet_count);
     } else {
         weld(s, &w, out);
         join(s, &w, out);
+        measure(s, out);
         status = bst_facet_net_find_apart(ctx, out);
     }
     free_work(&w);

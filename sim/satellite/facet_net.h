@@ -26,6 +26,8 @@ typedef struct bst_facet_net {
     bst_net_edge *edges;
     uint8_t *apart; /* by facet, in any pose: BST_NET_APART: no other one crosses it or overlaps it
                        in its plane; BST_NET_FREE: nor has one of its sides, but those of both */
+    float *size_m;  /* by facet: its longest side or diagonal, or a little more */
+    int *material;  /* by facet */
     int vertex_count, edge_count;
 } bst_facet_net;
 

@@ -117,81 +117,10 @@ bst_status bst_resolved_begin_light_beside(bst_ctx *ctx, bst_resolved *r, const 
     return begin(ctx, r, first, blurred);
 }
 
-/* Finds planes and middles of the facets. */
-static void place_facets(const bst_resolved_adding *a) {
-    bst_resolved_areas *s = &a->r->areas;
-    const bst_satellite *sat = a->r->satellite;
-    for (int f = 0; f < sat->facet_count && !s->placed; f++) {
-        const int *corner = s->net.corner + s->net.first[f];
-        int count = s->net.first[f + 1] - s->net.first[f];
-        bst_vec3 normal = a->pose->normals[f], middle = {0};
-        for (int i = 0; i < count; i++) {
-            middle =
-                bst_vec3_axpy(middle, 1.0 / count, a->pose->vertices[s->net.vertex[corner[i]]]);
-        }
-        bst_vec3 from = a->pose->vertices[s->net.vertex[corner[0]]];
-        s->planes[f] = (bst_resolved_plane){normal, bst_vec3_dot(normal, from)};
-        s->middles[f] = middle;
-    }
-    s->placed = sat->joint_count == 0;
-}
-
-/* Places the vertices in the image and finds the facets that face the observer. */
-static bst_status face_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
-    bst_resolved_areas *s = &a->r->areas;
-    const bst_satellite *sat = a->r->satellite;
-    bst_facet_layers *l = &s->eye;
-    BST_TRY(bst_facet_layers_begin(ctx, l, &s->net, a->r->image.width, a->r->image.height));
-    l->same = BST_RESOLVED_SAME * sat->radius_m;
-    double origin_m = a->view->origin_m.z;
-    for (int v = 0; v < s->net.vertex_count; v++) {
-        double depth_m;
-        l->at[v] = bst_resolved_project(a, a->pose->vertices[s->net.vertex[v]], &depth_m);
-        l->near[v] = origin_m * ((origin_m - depth_m) / depth_m);
-    }
-    for (int f = 0; f < sat->facet_count; f++) {
-        l->facing[f] = bst_vec3_dot(s->planes[f].normal, a->eye_m) > s->planes[f].offset_m;
-    }
-    l->facing[sat->facet_count] = 0;
-    return BST_OK;
-}
-
-/* Light of the facets that face the observer, if nothing hides them from it. Those with light are
- * wanted. */
-static void shade(const bst_resolved_adding *a) {
-    bst_resolved_areas *s = &a->r->areas;
-    const bst_satellite *sat = a->r->satellite;
-    for (int f = 0; f < sat->facet_count; f++) {
-        s->wanted[f] = 0;
-        if (!s->eye.facing[f]) {
-            continue;
-        }
-        bst_vec3 normal = s->planes[f].normal;
-        bst_resolved_shading light = {0.0, 0.0, 0.0, {0.0, 0.0}};
-        int material = sat->facets[f].material;
-        if (bst_vec3_dot(normal, a->light->sun) > 0.0 || a->earth ||
-            a->light->gain[material].emission > 0.0) {
-            light = bst_resolved_shade(a, material, s->middles[f], normal);
-        }
-        s->even[f] = light.uniform;
-        s->from[0][f] = light.sun;
-        s->from[1][f] = light.earth;
-        s->wanted[f] = light.uniform + light.sun + light.earth > 0.0;
-        bst_resolved_note_light(a, &light, false);
-    }
-}
-
-/* View from a light: a place in the body frame is at middle + per_m times its x and y. */
-typedef struct light_view {
-    bst_vec3 x, y, z; /* unit; z: toward the light */
-    double middle, per_m;
-    int side;
-} light_view;
-
-static light_view light_view_of(const bst_resolved_adding *a, bst_vec3 direction) {
+static bst_resolved_light_view light_view_of(const bst_resolved_adding *a, bst_vec3 direction) {
     double radius_m = a->r->satellite->radius_m;
     double across = ceil(2.0 * radius_m * a->per_m / fmax(a->view->origin_m.z, radius_m));
-    light_view v = {.z = direction};
+    bst_resolved_light_view v = {.z = direction};
     v.side = (int)fmin(fmax(across, LIGHT_CELLS_MIN), LIGHT_CELLS_MAX);
     v.middle = 0.5 * v.side;
     v.per_m = 0.499 * v.side / radius_m;
@@ -201,35 +130,48 @@ static light_view light_view_of(const bst_resolved_adding *a, bst_vec3 direction
     return v;
 }
 
-/* Finds the facets in sight that may be in the shadow of others. */
-static bst_status look_from_light(bst_ctx *ctx, const bst_resolved_adding *a, int n,
-                                  const light_view *v) {
+/* Starts the view from a light. */
+static bst_status begin_light_view(bst_ctx *ctx, const bst_resolved_adding *a, int n,
+                                   const bst_resolved_light_view *v) {
+    bst_facet_layers *l = &a->r->areas.lit[n];
+    l->same = BST_RESOLVED_SAME * a->r->satellite->radius_m;
+    l->cells_per_m = v->per_m;
+    return bst_facet_layers_begin(ctx, l, &a->r->areas.net, v->side, v->side);
+}
+
+/* Places vertices and facets in the view from the Earth: see bst_resolved_place_facets. */
+static void place_for_earth(const bst_resolved_adding *a, const bst_resolved_light_view *v) {
     bst_resolved_areas *s = &a->r->areas;
-    const bst_satellite *sat = a->r->satellite;
-    bst_facet_layers *l = &s->lit[n];
-    double least = n == 0 ? 0.0 : EARTH_LOW;
-    BST_TRY(bst_facet_layers_begin(ctx, l, &s->net, v->side, v->side));
-    l->same = BST_RESOLVED_SAME * sat->radius_m;
+    bst_facet_layers *l = &s->lit[1];
+    int facets = a->r->satellite->facet_count;
     for (int i = 0; i < s->net.vertex_count; i++) {
         bst_vec3 p = a->pose->vertices[s->net.vertex[i]];
-        l->at[i] = (bst_point2){v->middle + v->per_m * bst_vec3_dot(p, v->x),
-                                v->middle + v->per_m * bst_vec3_dot(p, v->y)};
+        l->at[i] = bst_resolved_light_place(v, p);
         l->near[i] = bst_vec3_dot(p, v->z);
     }
-    for (int f = 0; f < sat->facet_count; f++) {
-        double in = bst_vec3_dot(s->planes[f].normal, v->z);
-        l->facing[f] = in > 0.0;
-        s->wanted[f] = in > least && s->eye.facing[f] && s->from[n][f] > 0.0;
+    for (int f = 0; f < facets; f++) {
+        l->facing[f] = bst_vec3_dot(s->planes[f].normal, v->z) > 0.0;
     }
-    l->facing[sat->facet_count] = 0;
+    l->facing[facets] = 0;
+}
+
+/* Finds the facets in sight that may be in the shadow of others. */
+static bst_status look_from_light(bst_ctx *ctx, const bst_resolved_adding *a, int n,
+                                  const bst_resolved_light_view *v) {
+    bst_resolved_areas *s = &a->r->areas;
+    bst_facet_layers *l = &s->lit[n];
+    for (int f = 0; f < a->r->satellite->facet_count; f++) {
+        s->wanted[f] = l->facing[f] && s->eye.facing[f] && s->from[n][f] > 0.0 &&
+                       (n == 0 || bst_vec3_dot(s->planes[f].normal, v->z) > EARTH_LOW);
+    }
     return bst_facet_layers_find(ctx, l, s->wanted);
 }
 
 /* Adds the light of what a light reaches of a facet.
  *
  * Given:     whole  nothing hides the facet from the observer; else eye.clip has what is seen */
-static void add_lit(const bst_resolved_adding *a, int facet, int n, const light_view *v, bool whole,
-                    double light) {
+static void add_lit(const bst_resolved_adding *a, int facet, int n,
+                    const bst_resolved_light_view *v, bool whole, double light) {
     bst_resolved_areas *s = &a->r->areas;
     const bst_polygon_clip *lit = &s->lit[n].clip, *seen = &s->eye.clip;
     bst_point2 corner[BST_POLYGON_CORNERS_MAX], both[2 * BST_POLYGON_CORNERS_MAX];
@@ -263,8 +205,8 @@ static void add_lit(const bst_resolved_adding *a, int facet, int n, const light_
 }
 
 /* Adds a facet that faces the observer. Returned: its light per cell, if all of it has the same. */
-static double add_facet(const bst_resolved_adding *a, int facet, const light_view *views,
-                        double weight) {
+static double add_facet(const bst_resolved_adding *a, int facet,
+                        const bst_resolved_light_view *views, double weight) {
     bst_resolved_areas *s = &a->r->areas;
     bool whole = !s->eye.doubtful[facet] || bst_facet_layers_cut(&s->eye, facet);
     double even = s->even[facet];
@@ -342,10 +284,27 @@ static void keep(bst_resolved_areas *s) {
     }
 }
 
-void bst_resolved_join_light(bst_resolved *to, bst_resolved *from) {
-    add_kept(&to->areas);
-    add_kept(&from->areas);
-    bst_area_sums_add(&to->areas.sums, &from->areas.sums);
+void bst_resolved_settle_light(bst_resolved *r) {
+    add_kept(&r->areas);
+}
+
+/* Sums that are joined. */
+typedef struct joining {
+    bst_area_sums *to;
+    const bst_area_sums *from;
+} joining;
+
+/* Callback of the loop over rows. */
+static void join_rows(void *user, int begin, int end) {
+    const joining *j = user;
+    bst_area_sums_add(j->to, j->from, begin, end);
+}
+
+void bst_resolved_join_light(bst_resolved *to, const bst_resolved *from, bst_parallel *pool) {
+    enum { ROWS = 32 };
+    joining rows = {&to->areas.sums, &from->areas.sums};
+    assert(to->areas.kept_count == 0 && from->areas.kept_count == 0);
+    bst_parallel_for(pool, to->image.height, ROWS, join_rows, &rows);
     to->image.surface_light = fmax(to->image.surface_light, from->image.surface_light);
     for (int i = 0; i < BST_RESOLVED_PENUMBRAE; i++) {
         bst_resolved_penumbra *p = &to->image.penumbrae[i];
@@ -366,15 +325,16 @@ void bst_resolved_end_light(bst_resolved *r, double scale_rad) {
 bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, double weight) {
     bst_resolved_areas *s = &a->r->areas;
     const bst_satellite *sat = a->r->satellite;
-    light_view views[BST_RESOLVED_LIGHTS];
-    place_facets(a);
-    BST_TRY(face_eye(ctx, a));
-    shade(a);
-    BST_TRY(bst_facet_layers_find(ctx, &s->eye, s->wanted));
+    bst_resolved_light_view views[BST_RESOLVED_LIGHTS];
     views[0] = light_view_of(a, bst_resolved_shadow_sun(a->light));
+    BST_TRY(begin_light_view(ctx, a, 0, &views[0]));
+    BST_TRY(bst_resolved_place_facets(ctx, a, &views[0]));
+    BST_TRY(bst_facet_layers_find(ctx, &s->eye, s->wanted));
     BST_TRY(look_from_light(ctx, a, 0, &views[0]));
     if (a->earth) {
         views[1] = light_view_of(a, a->light->earthlight->centre);
+        BST_TRY(begin_light_view(ctx, a, 1, &views[1]));
+        place_for_earth(a, &views[1]);
         BST_TRY(look_from_light(ctx, a, 1, &views[1]));
     } else if (s->lit[1].doubtful) {
         memset(s->lit[1].doubtful, 0, (size_t)sat->facet_count);

@@ -188,6 +188,23 @@ bst_status bst_resolved_hide(bst_ctx *ctx, const bst_resolved_adding *a) BST_MUS
  * (`whole`). Returned: as bst_facet_layers_cut. */
 bool bst_resolved_cut_hidden(const bst_resolved_adding *a, int facet, bool whole);
 
+/* View from a light: a place in the body frame is at middle + per_m times its x and y. */
+typedef struct bst_resolved_light_view {
+    bst_vec3 x, y, z; /* unit; z: toward the light */
+    double middle, per_m;
+    int side;
+} bst_resolved_light_view;
+
+static inline bst_point2 bst_resolved_light_place(const bst_resolved_light_view *v, bst_vec3 p) {
+    return (bst_point2){v->middle + v->per_m * bst_vec3_dot(p, v->x),
+                        v->middle + v->per_m * bst_vec3_dot(p, v->y)};
+}
+
+/* Places the vertices in the views of r->areas.eye and, once it has begun, of r->areas.lit[0], and
+ * finds the facets that face the observer and the Sun, with their light if nothing hides them:
+ * r->areas.even and from; those with light are wanted (resolved_places.c). BST_ERR_MEMORY. */
+bst_status bst_resolved_place_facets(bst_ctx *ctx, const bst_resolved_adding *a,
+                                     const bst_resolved_light_view *sun) BST_MUST_CHECK;
 /* Adds the light of a pose to the sums (resolved_areas.c). BST_ERR_MEMORY. */
 bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a,
                                   double weight) BST_MUST_CHECK;

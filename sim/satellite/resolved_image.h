@@ -2,6 +2,7 @@
 #ifndef BST_SATELLITE_RESOLVED_IMAGE_H
 #define BST_SATELLITE_RESOLVED_IMAGE_H
 
+#include "sim/core/parallel.h"
 #include "sim/satellite/flux.h"
 #include "sim/satellite/polygon_clip.h"
 
@@ -164,8 +165,14 @@ bst_status bst_resolved_add_light(bst_ctx *ctx, bst_resolved *resolved, bst_sate
                                   const bst_resolved_view *view, const bst_resolved_light *light,
                                   double weight) BST_MUST_CHECK;
 
-/* Adds the sums of another image that began with the same box and cells. */
-void bst_resolved_join_light(bst_resolved *to, bst_resolved *from);
+/* Ends the poses of an image: before others are joined to it, or it to another one. */
+void bst_resolved_settle_light(bst_resolved *resolved);
+
+/* Adds the sums of another image that began with the same box and cells; the poses of both have
+ * ended.
+ *
+ * Given:     pool  of threads; NULL: the caller's alone */
+void bst_resolved_join_light(bst_resolved *to, const bst_resolved *from, bst_parallel *pool);
 
 /* Sets the light of the image, with its moments, to the sums.
  *

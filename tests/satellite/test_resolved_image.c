@@ -189,7 +189,9 @@ static void test_light(void **state) {
         bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[n], false));
         bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r[n], m.pose, &view, &light, 0.5));
     }
-    bst_resolved_join_light(r[1], r[2]);
+    bst_resolved_settle_light(r[1]);
+    bst_resolved_settle_light(r[2]);
+    bst_resolved_join_light(r[1], r[2], NULL);
     bst_resolved_end_light(r[1], view.scale_rad);
     const bst_resolved_image *one = bst_resolved_image_of(r[0]), *sum = bst_resolved_image_of(r[1]);
     for (int i = 0; i < one->width * one->height; i++) {
