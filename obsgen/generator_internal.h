@@ -57,6 +57,9 @@ typedef struct generator_blend {
     double snr; /* of the drawn peak */
 } generator_blend;
 
+/* Most places of a path whose steps are divided; see bst_star_trail_parts(). */
+enum { GENERATOR_PLACES = 512 };
+
 /* Streak-length steps of half a pixel up to the longest filtered streak. */
 enum { GENERATOR_STEPS = 258 };
 

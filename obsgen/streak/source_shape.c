@@ -142,12 +142,16 @@ void bst_generator_set_star_bias(bst_generator *g) {
 bst_star_trail_path bst_generator_object_path(const bst_generator *g, const generator_source *s) {
     const bst_obsgen_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
     double dx = s->path.dx - stars->dx, dy = s->path.dy - stars->dy;
-    for (int k = 0; k < g->path.count; k++) {
-        double u = (double)k / (g->path.count - 1) - 0.5;
+    int count = g->path.count;
+    int parts = bst_star_trail_parts(&g->path, dx, dy, g->total_sigma, GENERATOR_PLACES);
+    for (int k = 0; k < count; k++) {
+        double u = (double)k / (count - 1) - 0.5;
         g->object_x[k] = g->path_x[k] + u * dx;
         g->object_y[k] = g->path_y[k] + u * dy;
     }
-    return (bst_star_trail_path){g->object_x, g->object_y, g->path.count};
+    (void)bst_star_trail_divide(g->object_x, count, parts);
+    return (bst_star_trail_path){g->object_x, g->object_y,
+                                 bst_star_trail_divide(g->object_y, count, parts)};
 }
 
 /* Efficiencies of both filters and shape of an object in a frame whose stars have an uneven path.
