@@ -536,7 +536,8 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             keep_whole_rough(g, i);
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
-            b.point = g->uneven ? !s->as_streak : b.point || bst_generator_fits_point(g, s, &b);
+            b.point = g->uneven ? !s->as_streak && !s->own_streak
+                                : b.point || bst_generator_fits_point(g, s, &b);
             bst_obsgen_generated item = {.detection = bst_generator_measure(g, s, &b),
                                          .item = s->item,
                                          .drawn = s->as_streak && !b.point};
