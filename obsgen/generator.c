@@ -322,12 +322,17 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
     double b = g->binning;
     bool known = f->path_count >= 2;
     int count = known ? f->path_count : 2;
-    BST_TRY(reserve_path(ctx, g, count));
+    BST_TRY(reserve_path(ctx, g, count > GENERATOR_PLACES ? count : GENERATOR_PLACES));
     for (int k = 0; k < count; k++) {
         g->path_x[k] = known ? f->path_x_px[k] / b : (k - 0.5) * f->streak_dx_px / b;
         g->path_y[k] = known ? f->path_y_px[k] / b : (k - 0.5) * f->streak_dy_px / b;
     }
     g->path = (bst_star_trail_path){g->path_x, g->path_y, count};
+    if (count >= 3 && !g->smeared) { /* `way` of smeared frames has the light of whole steps */
+        int parts = bst_star_trail_parts(&g->path, 0.0, 0.0, g->total_sigma, GENERATOR_PLACES);
+        (void)bst_star_trail_divide(g->path_x, count, parts);
+        count = g->path.count = bst_star_trail_divide(g->path_y, count, parts);
+    }
     g->whole_path = (bst_obsgen_path_px){g->path_x[count - 1] - g->path_x[0],
                                          g->path_y[count - 1] - g->path_y[0]};
     memset(g->star_bias, 0, sizeof g->star_bias);
@@ -531,7 +536,8 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             keep_whole_rough(g, i);
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
-            b.point = g->uneven ? !s->as_streak : b.point || bst_generator_fits_point(g, s, &b);
+            b.point = g->uneven ? !s->as_streak && !s->own_streak
+                                : b.point || bst_generator_fits_point(g, s, &b);
             bst_obsgen_generated item = {.detection = bst_generator_measure(g, s, &b),
                                          .item = s->item,
                                          .drawn = s->as_streak && !b.point};

@@ -31,14 +31,16 @@ typedef struct generator_source {
     double level;         /* amplitude including noise */
     /* output of the frame's other filter relative to this one's amplitude; 0: one filter only */
     double other;
-    double start_x, start_y; /* where a point fit to it begins, relative to the mean of its path */
-    double point_flux;       /* uneven path: light that a point fit to it finds, of the whole */
-    uint64_t name;           /* stream of its random draws */
-    int item, head;          /* head: source with which it is merged; -1: none */
-    int partner;             /* the other source of a pair that the pair test found; -1: none */
-    double partner_widen;    /* variance factor of its position by the fit of both */
+    /* where a point fit to it begins, or its own streak's ends, relative to the mean of its path */
+    double start_x, start_y;
+    double point_flux;    /* uneven path: light that this fit finds, of the whole */
+    uint64_t name;        /* stream of its random draws */
+    int item, head;       /* head: source with which it is merged; -1: none */
+    int partner;          /* the other source of a pair that the pair test found; -1: none */
+    double partner_widen; /* variance factor of its position by the fit of both */
     bool star, as_streak, found, saturated;
-    bool broken; /* longer than is filtered for: detected in fragments */
+    bool own_streak; /* object on an uneven path: a point that is fitted again as a streak */
+    bool broken;     /* longer than is filtered for: detected in fragments */
 } generator_source;
 
 typedef struct generator_rank {
@@ -56,6 +58,12 @@ typedef struct generator_blend {
     bool point; /* streak that the point filter shows better */
     double snr; /* of the drawn peak */
 } generator_blend;
+
+/* SNR above which size and own streak of a source are measured. */
+enum { GENERATOR_MOMENTS_SNR = 10 };
+
+/* Most places of a path whose steps are divided; see bst_star_trail_parts(). */
+enum { GENERATOR_PLACES = 512 };
 
 /* Streak-length steps of half a pixel up to the longest filtered streak. */
 enum { GENERATOR_STEPS = 258 };

@@ -3,8 +3,6 @@
 #include "obsgen/generator_internal.h"
 #include "obsgen/model/place_error.h"
 
-/* SNR above which size and own streak of a source are measured. */
-static const double MOMENTS_SNR = 10.0;
 /* Lower limit of the visible share used for errors. */
 static const double LEAST_SEEN = 0.02;
 /* Draws of a point's error until its maximum exceeds the threshold, and their number's place in
@@ -49,6 +47,11 @@ static void shared_bias(const bst_generator *g, const generator_source *s, bool 
         for (int k = 0; k < 2; k++) {
             bias[k] = table[i][k] + (at - i) * (table[i + 1][k] - table[i][k]);
         }
+        return;
+    }
+    if (s->own_streak) {
+        bias[0] = s->start_x;
+        bias[1] = s->start_y;
         return;
     }
     const bst_star_trail_path path = bst_generator_object_path(g, s);
@@ -204,12 +207,14 @@ static void set_extent(const bst_generator *g, const generator_source *s, bool a
                        bst_detection *d) {
     double modelled = as_streak ? g->streak : 0.0, b = g->binning;
     /* on an uneven path a point is the bright part of the light */
-    double length = d->snr >= MOMENTS_SNR && (as_streak || !g->uneven) ? s->length : modelled;
+    double length = d->snr >= GENERATOR_MOMENTS_SNR && (as_streak || s->own_streak || !g->uneven)
+                        ? s->length
+                        : modelled;
     double across2 = g->sigma * g->sigma, along2 = across2 + length * length / 12.0;
     d->length_px = b * BST_FWHM_PER_SIGMA * sqrt(along2);
     d->width_px = b * BST_FWHM_PER_SIGMA * sqrt(across2);
     d->angle_rad = length > 0.01 ? atan2(s->path.dy, s->path.dx) : 0.0;
-    if (d->snr >= MOMENTS_SNR && s->shape_xx + s->shape_yy > 0.0) {
+    if (d->snr >= GENERATOR_MOMENTS_SNR && s->shape_xx + s->shape_yy > 0.0) {
         bst_generator_set_image_extent(g, s, length, d);
     }
     if (d->angle_rad > 0.5 * BST_PI) {
@@ -218,7 +223,7 @@ static void set_extent(const bst_generator *g, const generator_source *s, bool a
         d->angle_rad += BST_PI;
     }
     bool long_enough = d->length_px > 1.5 * fmax(d->width_px, b);
-    if (as_streak || (d->snr >= MOMENTS_SNR && long_enough)) {
+    if (as_streak || (d->snr >= GENERATOR_MOMENTS_SNR && long_enough)) {
         d->flags |= BST_DETECTION_STREAK;
     }
 }
@@ -271,9 +276,10 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     bst_detection d = {0};
     double seen = fmax(s->visible, LEAST_SEEN);
     /* the point filter's flux of a streak too faint to be fitted as one */
-    bool own = !b->point && (s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5);
+    bool own = !b->point && (s->as_streak || s->own_streak || s->peak >= GENERATOR_MOMENTS_SNR ||
+                             s->length < 0.5);
     double length = own && (s->as_streak || is_drawn_out(g, s)) ? s->length : 0.0;
-    double caught = own ? 1.0 : caught_by_point(g, s);
+    double caught = own && !s->own_streak ? 1.0 : caught_by_point(g, s);
     double flux = b->flux_e * caught;
     /* errors follow the image's bound; the stated covariance follows that of the onboard PSF */
     bst_crlb_table_at truth = bound_of_image(g, b->flux_e, s->length);

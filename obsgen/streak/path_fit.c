@@ -7,9 +7,9 @@
 #include "sim/core/cholesky.h"
 
 enum {
-    SAMPLES = 64, /* of a path */
+    SAMPLES = 64, /* of a path that is not longer than as many steps */
     MODEL = 48,   /* of a streak model */
-    LIGHTS = 256, /* of several streaks */
+    LIGHTS = 256, /* of several streaks or a long path */
     /* of the grid on which light is fitted: along the streak and across */
     COLUMNS = 96,
     ROWS = 32,
@@ -49,11 +49,23 @@ static void turn(samples *s, double cosine, double sine) {
     }
 }
 
-/* Averages the path over at most SAMPLES equal parts of the exposure. Faster jitter is in the
- * spread.
- */
-static void sample_path(const bst_star_trail_path *p, samples *out) {
-    out->count = p->count < SAMPLES ? p->count : SAMPLES;
+/* Distance over which a path goes on the whole: jitter is not counted. */
+static double extent_of(const bst_star_trail_path *p) {
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (int k = 0; k < p->count; k++) {
+        low[0] = fmin(low[0], p->x_px[k]);
+        high[0] = fmax(high[0], p->x_px[k]);
+        low[1] = fmin(low[1], p->y_px[k]);
+        high[1] = fmax(high[1], p->y_px[k]);
+    }
+    return hypot(high[0] - low[0], high[1] - low[1]);
+}
+
+/* Averages the path over equal parts of the exposure: SAMPLES, or as many as make steps of `step`,
+ * at most LIGHTS. Faster jitter is in the spread. */
+static void sample_path(const bst_star_trail_path *p, double step, samples *out) {
+    int parts = (int)fmin(fmax(ceil(extent_of(p) / step), SAMPLES), LIGHTS);
+    out->count = p->count < parts ? p->count : parts;
     double squares = 0.0;
     for (int i = 0; i < out->count; i++) {
         out->x[i] = out->y[i] = out->weight[i] = 0.0;
@@ -204,7 +216,7 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
     bst_path_fit_squares squares = {0.0, 0.0, 0.0};
     samples star, streak, about;
     planes seen, shape;
-    sample_path(path, &star);
+    sample_path(path, model->sigma_px, &star);
     sample_model(model, &streak);
     sample_model(stamp, &about);
     double length = hypot(stamp->path.dx, stamp->path.dy);
@@ -332,17 +344,21 @@ static double image_norm(const samples *s, const bst_path_widths *w) {
 bst_path_outputs bst_path_fit_outputs(const bst_star_trail_path *path, bst_obsgen_path_px filter,
                                       const bst_path_widths *w) {
     samples s;
-    sample_path(path, &s);
+    sample_path(path, w->both_px, &s);
     double length = hypot(filter.dx, filter.dy);
     double root = sqrt(2.0 * w->both_px * w->both_px + s.spread);
+    double far = length + 9.0 * root; /* beyond, there is no light */
     double c = length > 0.0 ? filter.dx / length : 1.0, n = length > 0.0 ? filter.dy / length : 0.0;
-    double streak = 0.0, beside = 0.0, points[SAMPLES];
+    double streak = 0.0, beside = 0.0, points[LIGHTS];
     int streak_at = 0;
     bst_path_outputs out = {.point = 0.0};
     for (int k = 0; k < s.count; k++) {
         double point = 0.0, drawn = 0.0;
         for (int i = 0; i < s.count; i++) {
             double dx = s.x[i] - s.x[k], dy = s.y[i] - s.y[k], d2 = dx * dx + dy * dy;
+            if (d2 > far * far) {
+                continue;
+            }
             point += s.weight[i] * exp(-0.5 * d2 / (root * root));
             if (length > 0.0) {
                 double u = dx * c + dy * n, v = dy * c - dx * n;

@@ -15,6 +15,8 @@ static const double UNIFORM_PX = 0.05;
  * (imgproc/measure/locate.c).
  */
 static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
+/* A shorter path measures less than 1.5 FWHM of a point. */
+static const double LEAST_OWN_SIGMAS = 3.9;
 
 bst_streak_model bst_generator_streak_model(const bst_generator *g) {
     return (bst_streak_model){
@@ -142,12 +144,38 @@ void bst_generator_set_star_bias(bst_generator *g) {
 bst_star_trail_path bst_generator_object_path(const bst_generator *g, const generator_source *s) {
     const bst_obsgen_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
     double dx = s->path.dx - stars->dx, dy = s->path.dy - stars->dy;
-    for (int k = 0; k < g->path.count; k++) {
-        double u = (double)k / (g->path.count - 1) - 0.5;
+    int count = g->path.count;
+    int parts = bst_star_trail_parts(&g->path, dx, dy, g->total_sigma, GENERATOR_PLACES);
+    for (int k = 0; k < count; k++) {
+        double u = (double)k / (count - 1) - 0.5;
         g->object_x[k] = g->path_x[k] + u * dx;
         g->object_y[k] = g->path_y[k] + u * dy;
     }
-    return (bst_star_trail_path){g->object_x, g->object_y, g->path.count};
+    (void)bst_star_trail_divide(g->object_x, count, parts);
+    return (bst_star_trail_path){g->object_x, g->object_y,
+                                 bst_star_trail_divide(g->object_y, count, parts)};
+}
+
+/* Fits an object's elongated point again as a streak of its own (imgproc/measure/source_moments.h),
+ * if that leaves less of the light than the point does. */
+static void fit_own_streak(const bst_generator *g, const bst_star_trail_path *path, double light,
+                           generator_source *s) {
+    double c = s->path.dx / s->length, n = s->path.dy / s->length, square = 0.0;
+    for (int k = 0; k < path->count; k++) {
+        double u = path->x_px[k] * c + path->y_px[k] * n;
+        square += (k == 0 || k == path->count - 1 ? 0.5 : 1.0) * u * u / (path->count - 1);
+    }
+    double length = sqrt(12.0 * square); /* of a uniform streak with this second moment */
+    const bst_streak_model own = {.path = {length * c, length * n}, .sigma_px = g->total_sigma},
+                           point = {.sigma_px = g->total_sigma};
+    double at[2] = {0.0, 0.0}, point_at[2] = {s->start_x, s->start_y};
+    bst_path_fit_squares streak = bst_path_fit(path, &own, &own, light, at);
+    s->own_streak = streak.left < bst_path_fit(path, &point, &own, light, point_at).left;
+    if (s->own_streak) {
+        s->start_x = at[0];
+        s->start_y = at[1];
+        s->point_flux = fmin(fmax(streak.flux, 0.0), 1.0);
+    }
 }
 
 /* Efficiencies of both filters and shape of an object in a frame whose stars have an uneven path.
@@ -168,12 +196,17 @@ static void set_uneven_object(const bst_generator *g, generator_source *s, doubl
         !is_point(g, s, &o, point_lead(g, &path, light, streak, plain, at, &s->point_flux));
     efficiency[0] = fmin(o.point, 1.0);
     efficiency[1] = fmin(o.streak, 1.0);
+    double snr = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
+    if (!s->as_streak && s->length > LEAST_OWN_SIGMAS * g->total_sigma &&
+        snr * o.point > GENERATOR_MOMENTS_SNR) {
+        fit_own_streak(g, &path, light, s);
+    }
 }
 
 double bst_generator_set_filter(const bst_generator *g, generator_source *s) {
     const bst_obsgen_path_px point = {0.0, 0.0};
     double efficiency[2] = {g->filters[0].efficiency, g->filters[1].efficiency};
-    s->as_streak = false;
+    s->as_streak = s->own_streak = false;
     s->other = 0.0;
     bst_response wide; /* widths alone */
     const bst_response *response = &g->response;

@@ -164,6 +164,31 @@ static void ridge_at(const bst_star_trail_path *p, int k, double within_px, doub
     at_px[1] = sum[1] / count + (k - middle) * slope[1] / square;
 }
 
+int bst_star_trail_parts(const bst_star_trail_path *p, double more_x_px, double more_y_px,
+                         double step_px, int most) {
+    assert(p && p->count >= 2 && step_px > 0.0);
+    double longest2 = 0.0;
+    int steps = p->count - 1;
+    for (int k = 1; k <= steps; k++) {
+        double dx = p->x_px[k] - p->x_px[k - 1] + more_x_px / steps;
+        double dy = p->y_px[k] - p->y_px[k - 1] + more_y_px / steps;
+        longest2 = fmax(longest2, dx * dx + dy * dy);
+    }
+    double parts = fmin(ceil(sqrt(longest2) / step_px), (most - 1) / steps);
+    return parts > 1.0 ? (int)parts : 1;
+}
+
+int bst_star_trail_divide(double *places, int count, int parts) {
+    assert(places && count >= 2 && parts >= 1);
+    for (int k = count - 1; k > 0; k--) { /* from the end: places move to higher indices */
+        double from = places[k - 1], to = places[k];
+        for (int i = 1; i <= parts; i++) {
+            places[(k - 1) * parts + i] = from + (to - from) * i / parts;
+        }
+    }
+    return (count - 1) * parts + 1;
+}
+
 int bst_star_trail_lay(const bst_star_trail_path *p, double sigma_px, bst_star_trail_node *nodes) {
     trail_builder l = {.nodes = nodes};
     /* an even average over this distance to both sides has the variance of the filter's output */

@@ -21,6 +21,18 @@ typedef struct bst_star_trail_path {
     int count; /* at least 2 */
 } bst_star_trail_path;
 
+/* Number of equal parts of each step of a path whose sums over places are those over its light: no
+ * part is longer than step_px, unless the path then had more than `most` places. Between its places
+ * a path is straight and uniform, as in images (bst_los_track_attitude).
+ *
+ * Given:     more_*_px  uniform motion on top of the path */
+int bst_star_trail_parts(const bst_star_trail_path *path, double more_x_px, double more_y_px,
+                         double step_px, int most);
+
+/* Divides each step of a path, along one axis, into equal parts. `places` has room for the new
+ * number of places, (count - 1) parts + 1, which is returned. */
+int bst_star_trail_divide(double *places, int count, int parts);
+
 /* Lays out the nodes of a trail; returns their number. A path that returns to a position has one
  * node there.
  *

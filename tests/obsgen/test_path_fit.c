@@ -510,6 +510,50 @@ static void a_point_far_along_its_path_has_the_light_there(void **state) {
     close_scene(&s);
 }
 
+/* A path known at eleven places is the same with 40 places on each of the lines between them. No
+ * place has the light of a whole step. */
+static void a_path_known_at_few_places_goes_on_between_them(void **state) {
+    (void)state;
+    enum { FEW = 11, EACH = (STEPS - 1) / (FEW - 1) };
+    scene s;
+    open_scene(&s);
+    start(&s);
+    path fine = slowing(44.0, 2.0), few;
+    for (int k = 0; k < FEW; k++) {
+        few.x[k] = fine.x[k * EACH];
+        few.y[k] = fine.y[k * EACH];
+    }
+    for (int k = 0; k < STEPS; k++) {
+        int from = k < STEPS - 1 ? k / EACH : FEW - 2;
+        double part = (double)k / EACH - from;
+        fine.x[k] = few.x[from] + part * (few.x[from + 1] - few.x[from]);
+        fine.y[k] = few.y[from] + part * (few.y[from + 1] - few.y[from]);
+    }
+    (void)run_on(&s, &fine, 60.0, 0);
+    bst_path_outputs stars[2];
+    double light[2]; /* under a point */
+    for (int i = 0; i < 2; i++) {
+        s.frame.path_x_px = i ? few.x : fine.x;
+        s.frame.path_y_px = i ? few.y : fine.y;
+        s.frame.path_count = i ? FEW : STEPS;
+        (void)run(&s, 0);
+        stars[i] = s.generator->outputs;
+        generator_source fast = s.generator->sources[0];
+        assert_true(s.generator->uneven);
+        fast.star = false;
+        fast.path.dx += 120.0;
+        fast.path.dy += 60.0;
+        (void)bst_generator_set_filter(s.generator, &fast);
+        assert_true(fast.as_streak);
+        light[i] = fast.point_flux;
+    }
+    /* steps of up to a sigma in the sums; a step of the path has a tenth of the light */
+    bst_assert_close(stars[1].point, stars[0].point, 0.01);
+    bst_assert_close(stars[1].streak, stars[0].streak, 0.01);
+    bst_assert_close(light[1], light[0], 0.003);
+    close_scene(&s);
+}
+
 /* Noise decides the shape of a faint star whose streak has a lower output than its point: one that
  * the streak's filter alone shows is a streak, and is no point below the threshold. */
 static void faint_stars_may_be_streaks(void **state) {
@@ -549,6 +593,7 @@ int main(void) {
         cmocka_unit_test(stars_that_rest_are_points_where_they_rest),
         cmocka_unit_test(a_point_has_the_light_at_rest),
         cmocka_unit_test(a_point_far_along_its_path_has_the_light_there),
+        cmocka_unit_test(a_path_known_at_few_places_goes_on_between_them),
         cmocka_unit_test(faint_stars_may_be_streaks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
