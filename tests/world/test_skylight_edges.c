@@ -165,12 +165,52 @@ static void other_edges_are_right(void **state) {
     bst_world_free(vignetted);
 }
 
+/* Light of warm optics is added once, whatever the sky is, and is not vignetted: in the band lwir,
+ * 300 K, emissivity 0.1 over four times the beam, 0.2 m, 3 arcsec and 0.8 e per photon, 4.11576e9
+ * e/s (test_band.c, by hand); without emission there is none. The exposure lasts 3 s. */
+static void warm_optics_count_once(void **state) {
+    (void)state;
+    static const char *const models[] = {"\"stray_e_per_s\": 1",
+                                         "\"model\": \"sky\", \"starlight\": false"};
+    bst_scene_surroundings around = look_down((bst_vec3){4.2e7, 0, 0}, 2);
+    around.exposure_s = 3;
+    for (int m = 0; m < 2; m++) {
+        double value[2][2];
+        for (int warm = 0; warm < 2; warm++) {
+            char text[2000];
+            snprintf(text, sizeof text,
+                     "{\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": "
+                     "[{\"name\": \"neossat\", " TEST_NEOSSAT
+                     ", \"sensors\": [{\"camera\": "
+                     "{\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.2, \"width_px\": 64, "
+                     "\"height_px\": 64, \"quantum_efficiency\": 0.8, \"throughput\": 0.5, "
+                     "\"background_mag_arcsec2\": 21, \"band\": {\"preset\": \"lwir\", "
+                     "\"optics_temperature_k\": 300, \"optics_emissivity\": %s, "
+                     "\"optics_beam_factor\": 4}, \"optics\": {\"vignetting\": {\"model\": "
+                     "\"polynomial\", \"coefficients\": [-0.5, 0, 0]}}, \"background\": {%s}}}]}]}",
+                     warm ? "0.1" : "0", models[m]);
+            bst_world *world = test_world(text);
+            bst_skylight *s;
+            const bst_skylight_map *map = make(world, &around, (bst_window){0, 0, 64, 64}, &s);
+            value[warm][0] = bst_skylight_at(map, 31.5, 31.5);
+            value[warm][1] = bst_skylight_at(map, 2, 5);
+            bst_skylight_free(s);
+            bst_world_free(world);
+        }
+        for (int place = 0; place < 2; place++) {
+            /* digits of the number above, and floats */
+            bst_assert_close((value[1][place] - value[0][place]) / (3 * 4.11576e9), 1, 1e-4);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges_are_drawn_pixel_by_pixel),
         cmocka_unit_test(places_agree_with_the_whole_map),
         cmocka_unit_test(interpolated_squares_are_right),
         cmocka_unit_test(other_edges_are_right),
+        cmocka_unit_test(warm_optics_count_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
