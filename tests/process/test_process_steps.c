@@ -12,7 +12,8 @@ enum { FRAMES = 3, PATH = 9 };
 static struct {
     bst_plate_solve_result result[FRAMES];
     int64_t selected;
-    double v_limit; /* that the catalogue, the solver and the zero points are to have */
+    bool flipped, needs_flip; /* rows as they are read; stars are found in those only */
+    double v_limit;           /* that the catalogue, the solver and the zero points are to have */
     bst_imgproc_expected_star expected[8];
     int expected_count;
     bst_predicted_stars_query query;
@@ -85,8 +86,8 @@ WRAP(bst_status, bst_recorded_frames_select,
       const bst_recorded_options *options, bst_recorded_frame *out)) {
     (void)ctx;
     (void)frames;
-    (void)options;
     script.selected = index;
+    script.flipped = options->flip_rows;
     *out = (bst_recorded_frame){.width = 600, .height = 400};
     return BST_OK;
 }
@@ -114,7 +115,8 @@ WRAP(bst_status, bst_plate_solve,
     bst_assert_close(options->v_limit, script.v_limit, 0.0);
     bst_assert_close(options->scale_tolerance, 0.07, 0.0);
     bst_assert_close(options->least_snr, 13.5, 0.0);
-    *out = script.result[script.selected];
+    *out = script.flipped == script.needs_flip ? script.result[script.selected]
+                                               : (bst_plate_solve_result){.stars = 5};
     return BST_OK;
 }
 
@@ -246,7 +248,46 @@ static void attitudes_along_the_streaks(void **state) {
     assert_int_equal(script.query.window.height, 400);
 }
 
-/* Without a limit in the request that of the map holds; the rows that the request names stay. */
+/* Rows are read from the other end if no frame has stars so, unless the request names their order;
+ * what a WCS says of the attitude is of the order in which the headers were read. */
+static void order_of_rows(void **state) {
+    (void)state;
+    static const struct {
+        int request;
+        bool needs, found, flipped; /* `flipped`: in the end */
+        int attitude;
+        bool keeps; /* the header's attitude */
+    } rows[] = {{BST_PROCESS_FLIP_AUTO, false, true, false, BST_KEYWORD_WCS, true},
+                {BST_PROCESS_FLIP_AUTO, true, true, true, BST_KEYWORD_WCS, false},
+                {BST_PROCESS_FLIP_AUTO, true, true, true, BST_KEYWORD_QUATERNION, true},
+                {BST_PROCESS_FLIP_NO, true, false, false, BST_KEYWORD_WCS, true},
+                {BST_PROCESS_FLIP_YES, true, true, true, BST_KEYWORD_WCS, true},
+                {BST_PROCESS_FLIP_AUTO, true, false, false, BST_KEYWORD_WCS, true}};
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        bst_ctx ctx = {0};
+        bst_process p = make();
+        bool starless = rows[k].needs && !rows[k].found;
+        for (int i = 0; i < FRAMES; i++) {
+            set_result(i, start_attitude, 1.0);
+            script.result[i].attitude.solved = !starless;
+            frames[i].has_header_attitude = true;
+            frames[i].q_header = start_attitude;
+        }
+        script.needs_flip = rows[k].needs;
+        script.v_limit = request.v_limit;
+        request.flip = rows[k].request;
+        p.options.flip_rows = rows[k].request == BST_PROCESS_FLIP_YES; /* as the survey has it */
+        p.map.attitude = rows[k].attitude;
+        bst_assert_ok(&ctx, bst_process_solve(&ctx, &p));
+        assert_int_equal(p.solved, rows[k].found ? FRAMES : 0);
+        assert_int_equal(p.options.flip_rows, rows[k].flipped);
+        assert_int_equal(frames[1].has_header_attitude, rows[k].keeps);
+    }
+    request.flip = BST_PROCESS_FLIP_AUTO;
+    script.needs_flip = false;
+}
+
+/* Without a limit in the request that of the map holds. */
 static void limits_of_request_and_map(void **state) {
     (void)state;
     for (int given = 0; given < 2; given++) {
@@ -387,6 +428,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(attitudes_along_the_streaks),
         cmocka_unit_test(limits_of_request_and_map),
+        cmocka_unit_test(order_of_rows),
         cmocka_unit_test(rates_tell_which_end_came_first),
         cmocka_unit_test(pointing_of_frames),
     };
