@@ -149,6 +149,7 @@ class Whole(unittest.TestCase):
         path = write(folder, sweeps=None, dispersions=None, replicates=1,
                      scenarios=[{"file": os.path.abspath("scenarios/constellation_quick.json")}],
                      set={"/duration_s": 60, "/world/star_catalogue": "embedded",
+                          "/observers/3/sensors/0/exposure/period_s": 1.5,
                           "/epoch_utc": runs.DARK.split("=")[1], **{sensors.format(i): 6 for i in range(5)}})
         result = study(path, "--out", os.path.join(folder, "out"), "--workers", "1")
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -161,7 +162,31 @@ class Whole(unittest.TestCase):
         row, = rows(os.path.join(folder, "out"))
         self.assertGreater(float(row["tasks"]), 5)
         self.check_sightings(row, by_hand)
-        self.assertEqual(len(rows(os.path.join(folder, "out"), "sensors")), 5)
+        self.check_sensors(row, rows(os.path.join(folder, "out"), "sensors"), by_hand)
+
+    def check_sensors(self, run, reported, out):
+        """A row each of sensors that see other things, counted in the run's own tables; the first
+        one's figures are those of the run."""
+        self.assertEqual([int(r["sensor"]) for r in reported], list(range(5)))
+        summaries = list(runs.manifest(out)["sensors"].values())
+        with runs.database(out) as database:
+            for i, row in enumerate(reported):
+                frames, = database.execute("SELECT count(*) FROM exposures WHERE sensor = ?",
+                                           (i,)).fetchone()
+                self.assertEqual(int(row["frames"]), frames, i)
+                tracks, = database.execute("SELECT count(DISTINCT track_id) FROM tracks WHERE "
+                                           "sensor = ? AND status != 'tentative'", (i,)).fetchone()
+                self.assertEqual(int(row["tracks"]), tracks, i)
+                for name in ("custody", "track_fraction", "pointing_rms_px", "track_rms_px",
+                             "visible_frames", "time_to_confirm_s", "false_tracks"):
+                    found = float(row[name]) if row[name] else None
+                    self.assertEqual(found is None, summaries[i][name] is None, (i, name))
+                    if found is not None:
+                        self.assertTrue(math.isclose(found, summaries[i][name], rel_tol=1e-14))
+        self.assertGreater(len({r["detections"] for r in reported}), 2)
+        self.assertEqual([int(r["frames"]) for r in reported], [30, 30, 30, 40, 30])
+        for name in ("frames", "detections", "tracks", "pointing_rms_px", "track_rms_px"):
+            self.assertEqual(run[name], reported[0][name], name)
 
     def test_tables_agree(self):
         """Statistics are those of the rows; the database holds what the CSV files do."""
