@@ -366,7 +366,7 @@ static void changes_hold_from_the_next_exposure_on(void **state) {
             assert_true(l.count >= 4);
             for (int i = 0; i < 4; i++) {
                 const bst_exposure *e = &l.items[i];
-                bool old = open && i == 0; /* that which was open: the second one */
+                bool old = open && i == 0; /* the second one, open when it was saved */
                 assert_int_equal(e->id, i + (open ? 1 : 2));
                 assert_int_equal(e->start_tick, old ? 6000 : 12000 + (i - open) * rows[k].period);
                 assert_int_equal(e->end_tick - e->start_tick, old ? 3000 : rows[k].exposure);
