@@ -166,6 +166,49 @@ static void hits_are_counted_by_area_and_time(void **state) {
     free(f);
 }
 
+/* Charge and length of hits in electrons and micrometres: with a gain of 1.5 +- 0.03 e/DN (2 %) and
+ * pixels of 15 um, neither of which is 1. */
+static void hits_have_electrons_and_micrometres(void **state) {
+    (void)state;
+    enum { HITS = 200 };
+    static bst_radiation_hit items[HITS];
+    for (int i = 0; i < HITS; i++) { /* charges 10 to 1005 DN in another order, 1 to 4 pixels */
+        items[i].charge_dn = (float)(10 + 5 * ((i * 77) % HITS));
+        items[i].pixels = 1 + (i * 77) % HITS * 4 / HITS;
+    }
+    bst_sensor_stacks s = {.pixel_pitch_um = 15.0};
+    s.dark.exposure_s = 20.0;
+    s.dark.hits = (bst_radiation_hits){
+        .frames = 10, .width = 300, .height = 200, .count = HITS + 3, .items = items, .used = HITS};
+    const bst_hit_law law = bst_radiation_hits_fit(&s.dark.hits);
+    assert_true(law.depth_px.value > 0.0 && law.charge_dn.value > 0.0 && law.depth_px.sigma > 0.0);
+    bst_sensor_figures *f = test_calloc(1, sizeof *f);
+    f->width = 300;
+    f->height = 200;
+    f->figures[BST_SENSOR_GAIN] = (bst_sensor_estimate){1.5, 0.03};
+    bst_sensor_measure_hits(&s, f);
+    /* the upper of the two middle charges; density at it from the charges of 3/8 and 5/8: 250 DN
+     * apart for a quarter of the hits, so that sigma = 2 * 250 / sqrt(200) */
+    const double median = 510.0, spread = 2.0 * 250.0 / sqrt((double)HITS);
+    const struct {
+        bst_sensor_figure figure;
+        double value, relative; /* and its error over it */
+    } rows[] = {
+        {BST_SENSOR_HIT_CHARGE, 1.5 * median, hypot(spread / median, 0.02)},
+        {BST_SENSOR_HIT_LENGTH, law.depth_px.value, law.depth_px.sigma / law.depth_px.value},
+        {BST_SENSOR_HIT_DEPTH, 15.0 * law.depth_px.value, law.depth_px.sigma / law.depth_px.value},
+        {BST_SENSOR_HIT_E_PER_UM, 1.5 * law.charge_dn.value / 15.0,
+         hypot(law.charge_dn.sigma / law.charge_dn.value, 0.02)},
+        {BST_SENSOR_HIT_STRAGGLING, law.straggling.value,
+         law.straggling.sigma / law.straggling.value}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const bst_sensor_estimate *e = &f->figures[rows[i].figure];
+        bst_assert_close(e->value, rows[i].value, 1e-9 * rows[i].value);
+        bst_assert_close(e->sigma, rows[i].value * rows[i].relative, 1e-9 * rows[i].value);
+    }
+    test_free(f);
+}
+
 enum { SIDE = 200 };
 
 static double normal(uint32_t stream, size_t i) {
@@ -291,6 +334,7 @@ int main(void) {
         cmocka_unit_test(fit_finds_the_distribution),
         cmocka_unit_test(traps_are_found_on_each_side),
         cmocka_unit_test(hits_are_counted_by_area_and_time),
+        cmocka_unit_test(hits_have_electrons_and_micrometres),
         cmocka_unit_test(neighbours_give_back_the_noise_that_they_share),
         cmocka_unit_test(readout_time_is_that_of_the_charge_behind_hot_pixels)};
     return cmocka_run_group_tests(tests, NULL, NULL);

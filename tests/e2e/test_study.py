@@ -20,6 +20,7 @@ import unittest
 from astropy.io import fits
 
 import runs
+import study_figures
 
 KILLS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 2
 SENSOR = "/observers/0/sensors/0"
@@ -62,7 +63,7 @@ def rows(out, name="runs"):
         return list(csv.DictReader(file))
 
 
-class Whole(unittest.TestCase):
+class Whole(study_figures.StudyFigures, unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = runs.scratch()
@@ -125,22 +126,6 @@ class Whole(unittest.TestCase):
         self.assertEqual(int(row["detections"]), count)
         self.check_sightings(row, out)
 
-    def check_sightings(self, row, out):
-        """What is of all sensors together."""
-        reported = runs.manifest(out)["sightings"]
-        for name, of in (("tasks", "tasks"), ("tasks_done", "tasks_done"),
-                         ("passes_seen", "passes_seen"), ("objects_detected", "objects_seen"),
-                         ("revisit_mean_s", "revisit_mean_s"),
-                         ("longest_gap_mean_s", "longest_gap_mean_s"),
-                         ("object_custody", "custody_fraction_all"),
-                         ("object_custody_seen", "custody_fraction_seen"),
-                         ("place_rms_arcsec", "place_rms_arcsec"),
-                         ("tracks_rms_arcsec", "track_rms_arcsec")):
-            self.assertEqual(row[name] == "", reported[of] is None, name)
-            if row[name]:
-                # JSON has 15 digits where they do
-                self.assertTrue(math.isclose(float(row[name]), reported[of], rel_tol=1e-14), name)
-
     def test_several_observers(self):
         """The same of five with tasks, which have a row each in another table."""
         folder = os.path.join(self.folder, "constellation")
@@ -149,6 +134,7 @@ class Whole(unittest.TestCase):
         path = write(folder, sweeps=None, dispersions=None, replicates=1,
                      scenarios=[{"file": os.path.abspath("scenarios/constellation_quick.json")}],
                      set={"/duration_s": 60, "/world/star_catalogue": "embedded",
+                          "/observers/3/sensors/0/exposure/period_s": 1.5,
                           "/epoch_utc": runs.DARK.split("=")[1], **{sensors.format(i): 6 for i in range(5)}})
         result = study(path, "--out", os.path.join(folder, "out"), "--workers", "1")
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -161,7 +147,7 @@ class Whole(unittest.TestCase):
         row, = rows(os.path.join(folder, "out"))
         self.assertGreater(float(row["tasks"]), 5)
         self.check_sightings(row, by_hand)
-        self.assertEqual(len(rows(os.path.join(folder, "out"), "sensors")), 5)
+        self.check_sensors(row, rows(os.path.join(folder, "out"), "sensors"), by_hand)
 
     def test_tables_agree(self):
         """Statistics are those of the rows; the database holds what the CSV files do."""

@@ -1,6 +1,7 @@
 /* The exposure clock inside a simulation: exact ticks, latching, clipping, dropped frames. */
+#include "boresight/boresight.h"
 #include "sim/engine/kernel/exposure_clock.h"
-#include "sim/engine/simulation.h"
+#include "sim/engine/simulation_state.h"
 #include "tests/test_support.h"
 
 #include <unistd.h>
@@ -52,6 +53,10 @@ static void commander_destroy(void *self) {
     (void)self;
 }
 
+static bst_status commander_archive(void *self, bst_archive *archive) {
+    return self && archive ? BST_OK : BST_ERR_ARGUMENT; /* the engine knows when it writes */
+}
+
 static const bst_port commander_ports[] = {
     {.channel = BST_CHANNEL_SENSOR_COMMAND, .direction = BST_PORT_OUT}};
 static const bst_module_desc commander_module = {.abi = BST_MODULE_ABI,
@@ -64,6 +69,7 @@ static const bst_module_desc commander_module = {.abi = BST_MODULE_ABI,
                                                  .port_count = 1,
                                                  .create = commander_create,
                                                  .step = commander_step,
+                                                 .archive = commander_archive,
                                                  .destroy = commander_destroy};
 static const bst_module_desc *const modules[] = {&commander_module};
 static const bst_scenario_registry registry = {.modules = modules, .count = 1};
@@ -86,11 +92,21 @@ static bst_status keep(void *user, const char *scope, const char *channel, const
     return BST_OK;
 }
 
+/* Where a run is saved, or from where it goes on. */
+typedef struct saving {
+    int64_t tick;
+    bst_archive *archive;
+} saving;
+
+static bst_status restore(bst_ctx *ctx, bst_simulation *sim, void *user) {
+    return bst_simulation_archive(ctx, sim, user, BST_STATE_ALL);
+}
+
 /* Runs a scenario whose sensor has these "exposure" and "modules" blocks, and more keys of its
- * camera. */
-static bst_status try_camera(bst_ctx *ctx, const char *camera, const char *exposure,
-                             const char *module_block, const char *extra, int64_t until_tick,
-                             train *out) {
+ * camera, up to a tick or to that of `save`, from `from`; NULL allowed. */
+static bst_status try_part(bst_ctx *ctx, const char *camera, const char *exposure,
+                           const char *module_block, const char *extra, int64_t until_tick,
+                           const saving *save, const saving *from, train *out) {
     static const char format[] =
         "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300, %s"
         "\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": \"sat\","
@@ -106,19 +122,31 @@ static bst_status try_camera(bst_ctx *ctx, const char *camera, const char *expos
     bst_scenario scenario;
     bst_assert_ok(ctx, bst_scenario_read(ctx, json, &registry, &scenario));
     bst_simulation *sim = NULL;
-    bst_simulation_options options = {0};
+    bst_simulation_options options = {.restore = from ? restore : NULL,
+                                      .restore_user = from ? from->archive : NULL};
     bst_status status = bst_simulation_create(ctx, &scenario, &options, &sim);
     memset(out, 0, sizeof *out);
     if (status == BST_OK) {
         assert_null(bst_simulation_device(sim)); /* none was asked for */
         bst_engine *engine = bst_simulation_engine(sim);
         bst_engine_set_hooks(engine, &(bst_engine_hooks){.user = out, .message = keep});
-        bst_assert_ok(ctx, bst_engine_run(ctx, engine, until_tick));
+        if (save) {
+            bst_assert_ok(ctx, bst_engine_advance(ctx, engine, save->tick));
+            bst_assert_ok(ctx, bst_simulation_archive(ctx, sim, save->archive, BST_STATE_ALL));
+        } else {
+            bst_assert_ok(ctx, bst_engine_run(ctx, engine, until_tick));
+        }
     }
     bst_simulation_free(sim);
     bst_scenario_free(&scenario);
     bst_json_free(json);
     return status;
+}
+
+static bst_status try_camera(bst_ctx *ctx, const char *camera, const char *exposure,
+                             const char *module_block, const char *extra, int64_t until_tick,
+                             train *out) {
+    return try_part(ctx, camera, exposure, module_block, extra, until_tick, NULL, NULL, out);
 }
 
 static void run_camera(const char *camera, const char *exposure, const char *module_block,
@@ -299,6 +327,82 @@ static void scale_and_own_window(void **state) {
     assert_true(l.items[2].window.x0 == 300 && l.items[2].window.y0 == 400);
     assert_true(l.items[2].window.width == 50 && l.items[2].window.height == 60);
     bst_assert_close(l.items[2].pixel_scale_arcsec, 0, 0);
+}
+
+/* Saves at a tick and goes on with another "exposure" block. */
+static void run_changed(const char *before, const char *after, const char *module_block,
+                        int64_t save_tick, int64_t until_tick, train *out) {
+    bst_ctx ctx = {0};
+    saving save = {.tick = save_tick}, from;
+    size_t size;
+    bst_assert_ok(&ctx, bst_archive_create(&ctx, &save.archive));
+    bst_assert_ok(&ctx, try_part(&ctx, "", before, module_block, "", 0, &save, NULL, out));
+    const void *bytes = bst_archive_data(save.archive, &size);
+    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &from.archive));
+    bst_assert_ok(&ctx, try_part(&ctx, "", after, module_block, "", until_tick, NULL, &from, out));
+    bst_archive_free(from.archive), bst_archive_free(save.archive);
+}
+
+/* What the scenario has changed while a run was saved holds from the next exposure on, each setting
+ * by itself; the exposure that is open keeps its own. Frames begin every 6000 ticks and last 3000:
+ * saved while the second one is open, or after it. */
+static void changes_hold_from_the_next_exposure_on(void **state) {
+    (void)state;
+#define BLOCK(exposure, period, binning, x0)                                        \
+    "\"exposure_s\": " exposure ", \"period_s\": " period ", \"binning\": " binning \
+    ", \"window_px\": [" x0 ", 32, 200, 100]"
+    static const struct {
+        const char *after;
+        int exposure, period, binning, x0;
+    } rows[] = {{BLOCK("0.5", "1", "3", "16"), 3000, 6000, 3, 16},
+                {BLOCK("0.5", "1", "3", "17"), 3000, 6000, 3, 17},
+                {BLOCK("0.125", "1", "3", "16"), 750, 6000, 3, 16},
+                {BLOCK("0.5", "1.5", "3", "16"), 3000, 9000, 3, 16},
+                {BLOCK("0.5", "1", "4", "16"), 3000, 6000, 4, 16}};
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        for (int open = 0; open < 2; open++) {
+            train l;
+            run_changed(rows[0].after, rows[k].after, "", open ? 7000 : 10000, 50000, &l);
+            assert_true(l.count >= 4);
+            for (int i = 0; i < 4; i++) {
+                const bst_exposure *e = &l.items[i];
+                bool old = open && i == 0; /* the second one, open when it was saved */
+                assert_int_equal(e->id, i + (open ? 1 : 2));
+                assert_int_equal(e->start_tick, old ? 6000 : 12000 + (i - open) * rows[k].period);
+                assert_int_equal(e->end_tick - e->start_tick, old ? 3000 : rows[k].exposure);
+                assert_int_equal(l.ticks[i], e->end_tick);
+                assert_int_equal(e->binning, old ? 3 : rows[k].binning);
+                assert_int_equal(e->window.x0, old ? 16 : rows[k].x0);
+                assert_int_equal(e->window.width, 200);
+            }
+        }
+    }
+}
+
+/* What was commanded before holds on, also in the exposure that is open. */
+static void commands_outlast_saved_states(void **state) {
+    (void)state;
+    static const char before[] = "\"exposure_s\": 0.5",
+                      after[] =
+                          "\"exposure_s\": 0.75, \"period_s\": 3, \"binning\": 4, "
+                          "\"window_px\": [16, 32, 200, 100]";
+    for (int k = 0; k < 4; k++) { /* changed or not, saved within an exposure or between two */
+        train l;
+        run_changed(before, k % 2 ? after : before,
+                    "\"control\": {\"type\": \"commander\", \"at_tick\": 1000, \"exposure_s\": "
+                    "0.25, \"period_s\": 2, \"binning\": 2, \"x0\": 300, \"y0\": 200, "
+                    "\"width\": 50, \"height\": 60, \"pixel_scale_arcsec\": 1.5}",
+                    k < 2 ? 7000 : 10000, 40000, &l);
+        assert_int_equal(l.count, k < 2 ? 3 : 2);
+        for (int i = 0; i < l.count; i++) {
+            const bst_exposure *e = &l.items[i];
+            assert_int_equal(e->start_tick, 6000 + (i + (k < 2 ? 0 : 1)) * 12000);
+            assert_int_equal(e->end_tick - e->start_tick, 1500);
+            assert_int_equal(e->binning, 2);
+            assert_true(e->window.y0 == 200 && e->window.width == 50);
+            bst_assert_close(e->pixel_scale_arcsec, 1.5, 0);
+        }
+    }
 }
 
 /* Writes a file of frame updates and the keys that name it, closing the block "exposure" before. */
@@ -484,6 +588,8 @@ int main(void) {
         cmocka_unit_test(odd_commands_do_no_harm),
         cmocka_unit_test(rolling_shutters_take_their_time),
         cmocka_unit_test(scale_and_own_window),
+        cmocka_unit_test(changes_hold_from_the_next_exposure_on),
+        cmocka_unit_test(commands_outlast_saved_states),
         cmocka_unit_test(a_file_drives_the_frames),
         cmocka_unit_test(ramps_are_not_binned),
         cmocka_unit_test(settings_that_do_not_fit),

@@ -13,6 +13,7 @@ static struct {
     int files, width[FRAMES];
     bst_time begin;
     const char *camera; /* of the map, JSON */
+    bool flipped;       /* rows as they were read last */
 } script;
 
 #define WRAP(type, name, arguments) \
@@ -29,7 +30,10 @@ WRAP(bst_status, bst_cli_find_keyword_map, (bst_ctx * ctx, const char *name, cha
 WRAP(bst_status, bst_keyword_map_load, (bst_ctx * ctx, const char *path, bst_keyword_map *out)) {
     (void)ctx;
     (void)path;
-    *out = (bst_keyword_map){.pedestal_dn = 32768.0, .dn_per_unit = 2.0};
+    *out = (bst_keyword_map){
+        .pedestal_dn = 32768.0,
+        .dn_per_unit = 2.0,
+        .pixel_scale_arcsec = {.keyword = "SCALE", .factor = 3.0, .value = 25.0 / 6.0}};
     snprintf(out->time.keyword, sizeof out->time.keyword, "DATE-OBS");
     return BST_OK;
 }
@@ -102,7 +106,12 @@ WRAP(bst_status, bst_recorded_frames_select,
       const bst_recorded_options *options, bst_recorded_frame *out)) {
     (void)ctx;
     (void)frames;
-    (void)options;
+    double scale_arcsec = NAN; /* without a map: only the keyword's name is looked for */
+    if (options->map) {
+        const bst_keyword_number *scale = &options->map->pixel_scale_arcsec;
+        scale_arcsec = scale->factor * scale->value;
+    }
+    script.flipped = options->flip_rows;
     *out =
         (bst_recorded_frame){.path = "some.fits",
                              .place = {.hdu = (int)index + 1, .plane = -1},
@@ -114,7 +123,7 @@ WRAP(bst_status, bst_recorded_frames_select,
                                         .read_noise_e = 7.0,
                                         .offset_dn = 50.0,
                                         .full_well_e = 9e4,
-                                        .pixel_scale_arcsec = 12.5}};
+                                        .pixel_scale_arcsec = scale_arcsec}};
     return BST_OK;
 }
 
@@ -161,6 +170,26 @@ static void ticks_are_the_nearest(void **state) {
     bst_assert_ok(&ctx, survey(&ctx, &p));
     assert_int_equal(p.frames[2].exposure_ticks, 15001);
     free(p.frames);
+}
+
+/* The request's scale goes before the map's, which is 12.5; rows are read as it says. */
+static void request_goes_before_the_map(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_process p;
+    static const int flips[] = {BST_PROCESS_FLIP_AUTO, BST_PROCESS_FLIP_NO, BST_PROCESS_FLIP_YES};
+    for (int i = 0; i < 3; i++) {
+        begin();
+        request.scale_arcsec = i == 1 ? 0.0 : 7.25;
+        request.flip = flips[i];
+        bst_assert_ok(&ctx, survey(&ctx, &p));
+        bst_assert_close(p.scale_arcsec, i == 1 ? 12.5 : 7.25, 1e-12);
+        assert_string_equal(p.map.pixel_scale_arcsec.keyword, i == 1 ? "SCALE" : "");
+        assert_int_equal(script.flipped, flips[i] == BST_PROCESS_FLIP_YES);
+        free(p.frames);
+    }
+    request.scale_arcsec = 0.0;
+    request.flip = BST_PROCESS_FLIP_AUTO;
 }
 
 static void frames_follow_each_other(void **state) {
@@ -260,6 +289,7 @@ static void scenario_has_the_frames_camera_and_times(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ticks_are_the_nearest),
+        cmocka_unit_test(request_goes_before_the_map),
         cmocka_unit_test(frames_follow_each_other),
         cmocka_unit_test(scenario_has_the_frames_camera_and_times),
     };

@@ -12,6 +12,8 @@ enum { FRAMES = 3, PATH = 9 };
 static struct {
     bst_plate_solve_result result[FRAMES];
     int64_t selected;
+    bool flipped, needs_flip; /* rows as they are read; stars are found in those only */
+    double v_limit;           /* that the catalogue, the solver and the zero points are to have */
     bst_imgproc_expected_star expected[8];
     int expected_count;
     bst_predicted_stars_query query;
@@ -35,7 +37,7 @@ WRAP(bst_status, bst_star_patterns_create,
     (void)stars;
     /* the smaller side's angle */
     bst_assert_close(options->field_rad, 2.0 * atan(0.5 * 400.0 * PX), 1e-12);
-    bst_assert_close(options->v_limit, 9.5, 0.0);
+    bst_assert_close(options->v_limit, script.v_limit, 0.0);
     *out = NULL;
     return BST_OK;
 }
@@ -84,8 +86,8 @@ WRAP(bst_status, bst_recorded_frames_select,
       const bst_recorded_options *options, bst_recorded_frame *out)) {
     (void)ctx;
     (void)frames;
-    (void)options;
     script.selected = index;
+    script.flipped = options->flip_rows;
     *out = (bst_recorded_frame){.width = 600, .height = 400};
     return BST_OK;
 }
@@ -110,7 +112,11 @@ WRAP(bst_status, bst_plate_solve,
     assert_int_equal(width, 600);
     assert_int_equal(height, 400);
     bst_assert_close(options->tangent_per_px, PX, 1e-15);
-    *out = script.result[script.selected];
+    bst_assert_close(options->v_limit, script.v_limit, 0.0);
+    bst_assert_close(options->scale_tolerance, 0.07, 0.0);
+    bst_assert_close(options->least_snr, 13.5, 0.0);
+    *out = script.flipped == script.needs_flip ? script.result[script.selected]
+                                               : (bst_plate_solve_result){.stars = 5};
     return BST_OK;
 }
 
@@ -146,7 +152,8 @@ static void set_result(int i, bst_quat middle, double scale) {
     r->matched[2] = (bst_plate_solve_star){500.0, 90.0, 250.0};
 }
 
-static bst_process_request request = {.catalogue = "embedded", .v_limit = 9.5};
+static bst_process_request request = {
+    .catalogue = "embedded", .v_limit = 9.5, .scale_tolerance = 0.07, .least_snr = 13.5};
 static bst_process_frame frames[FRAMES];
 
 static bst_process make(void) {
@@ -165,6 +172,7 @@ static bst_process make(void) {
     return (bst_process){.request = &request,
                          .frames = frames,
                          .count = FRAMES,
+                         .map.star_limit_v_mag = 8.25,
                          .width = 600,
                          .height = 400,
                          .scale_arcsec = SCALE_ARCSEC};
@@ -191,6 +199,7 @@ static void attitudes_along_the_streaks(void **state) {
                    scales[i]);
     }
     set_expected();
+    script.v_limit = 9.5;
     bst_assert_ok(&ctx, bst_process_solve(&ctx, &p));
     assert_int_equal(p.solved, FRAMES);
     assert_true(p.direction_known);
@@ -237,6 +246,65 @@ static void attitudes_along_the_streaks(void **state) {
     bst_assert_close(script.query.v_limit, 11.5, 0.0);
     assert_int_equal(script.query.window.width, 600);
     assert_int_equal(script.query.window.height, 400);
+}
+
+/* Rows are read from the other end if no frame has stars so, unless the request names their order;
+ * what a WCS says of the attitude is of the order in which the headers were read. */
+static void order_of_rows(void **state) {
+    (void)state;
+    static const struct {
+        int request;
+        bool needs, found, flipped; /* `flipped`: in the end */
+        int attitude;
+        bool keeps; /* the header's attitude */
+    } rows[] = {{BST_PROCESS_FLIP_AUTO, false, true, false, BST_KEYWORD_WCS, true},
+                {BST_PROCESS_FLIP_AUTO, true, true, true, BST_KEYWORD_WCS, false},
+                {BST_PROCESS_FLIP_AUTO, true, true, true, BST_KEYWORD_QUATERNION, true},
+                {BST_PROCESS_FLIP_NO, true, false, false, BST_KEYWORD_WCS, true},
+                {BST_PROCESS_FLIP_YES, true, true, true, BST_KEYWORD_WCS, true},
+                {BST_PROCESS_FLIP_AUTO, true, false, false, BST_KEYWORD_WCS, true}};
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        bst_ctx ctx = {0};
+        bst_process p = make();
+        bool starless = rows[k].needs && !rows[k].found;
+        for (int i = 0; i < FRAMES; i++) {
+            set_result(i, start_attitude, 1.0);
+            script.result[i].attitude.solved = !starless;
+            frames[i].has_header_attitude = true;
+            frames[i].q_header = start_attitude;
+        }
+        script.needs_flip = rows[k].needs;
+        script.v_limit = request.v_limit;
+        request.flip = rows[k].request;
+        p.options.flip_rows = rows[k].request == BST_PROCESS_FLIP_YES; /* as the survey has it */
+        p.map.attitude = rows[k].attitude;
+        bst_assert_ok(&ctx, bst_process_solve(&ctx, &p));
+        assert_int_equal(p.solved, rows[k].found ? FRAMES : 0);
+        assert_int_equal(p.options.flip_rows, rows[k].flipped);
+        assert_int_equal(frames[1].has_header_attitude, rows[k].keeps);
+    }
+    request.flip = BST_PROCESS_FLIP_AUTO;
+    script.needs_flip = false;
+}
+
+/* Without a limit in the request that of the map holds. */
+static void limits_of_request_and_map(void **state) {
+    (void)state;
+    for (int given = 0; given < 2; given++) {
+        bst_ctx ctx = {0};
+        bst_process p = make();
+        for (int i = 0; i < FRAMES; i++) {
+            script.result[i] = (bst_plate_solve_result){.stars = 5};
+        }
+        set_result(1, start_attitude, 1.0);
+        request.v_limit =
+            given ? 7.75 : 0.0; /* brighter than the map's, in the first test fainter */
+        script.v_limit = given ? 7.75 : 8.25;
+        bst_assert_ok(&ctx, bst_process_solve(&ctx, &p));
+        bst_assert_close(script.query.v_limit, script.v_limit + 2.0, 0.0);
+        assert_int_equal(p.solved, 1);
+    }
+    request.v_limit = 9.5;
 }
 
 /* Rate of turn of the camera by the header's history: it accelerates from share to share. */
@@ -359,6 +427,8 @@ static void pointing_of_frames(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(attitudes_along_the_streaks),
+        cmocka_unit_test(limits_of_request_and_map),
+        cmocka_unit_test(order_of_rows),
         cmocka_unit_test(rates_tell_which_end_came_first),
         cmocka_unit_test(pointing_of_frames),
     };

@@ -1,5 +1,6 @@
 /* The plan of a run that begins from a saved state, ends early or saves its state, tick by tick.
  * Linked with wraps of engine, states and files. */
+#include "sim/core/wall_clock.h"
 #include "sim/engine/simulation_state.h"
 #include "sim/run/run_internal.h"
 #include "tests/stdout_text.h"
@@ -201,6 +202,21 @@ static void states_on_the_way(void **state) {
     expect_ticks(now.ticks, now.steps, ticks, 4);
     expect_ticks(now.saved, now.saves, saved, 3);
     assert_int_equal(now.finishes, 1);
+    /* the engine's last tick is 33000: of 33001 ticks the record has those from 20000 on */
+    bst_assert_close(bst_run_seconds(&f->run), 33001.0 / 6000.0, 1e-12);
+    bst_assert_close(bst_run_simulated_s(&f->run), 13001.0 / 6000.0, 1e-12);
+}
+
+/* A record that goes on has the times from its own begin, of all its parts. */
+static void times_of_a_record_that_goes_on(void **state) {
+    fixture *f = *state;
+    bst_assert_ok(&f->ctx, read_state(f, 20000, 4, false));
+    bst_assert_ok(&f->ctx, bst_run_plan(&f->run, &f->request));
+    f->run.begin_tick = 6000;
+    bst_assert_close(bst_run_simulated_s(&f->run), 27001.0 / 6000.0, 1e-12);
+    f->run.started = bst_wall_seconds() - 50.0;
+    f->run.earlier_s = 1000.0;
+    bst_assert_close(bst_run_wall_s(&f->run), 1050.0, 10.0); /* what the test itself may take */
 }
 
 /* At a multiple the next state is a whole interval later. */
@@ -261,6 +277,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_whole_run, set_up, tear_down),
         cmocka_unit_test_setup_teardown(states_on_the_way, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(times_of_a_record_that_goes_on, set_up, tear_down),
         cmocka_unit_test_setup_teardown(an_interrupt, set_up, tear_down),
         cmocka_unit_test_setup_teardown(limits, set_up, tear_down),
         cmocka_unit_test_setup_teardown(states_that_do_not_fit, set_up, tear_down),

@@ -165,12 +165,83 @@ static void other_edges_are_right(void **state) {
     bst_world_free(vignetted);
 }
 
+/* Background at the nodes (32, 32) and (0, 0), and at (63, 63), in the band lwir behind optics of
+ * 300 K, 0.2 m, 3 arcsec, a throughput of 0.5 and 0.8 e per photon; vignetted. */
+static void lwir_background(const char *emissivity, const char *background,
+                            const bst_scene_surroundings *around, double value[3]) {
+    char text[2000];
+    snprintf(text, sizeof text,
+             "{\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": "
+             "\"neossat\", " TEST_NEOSSAT
+             ", \"sensors\": [{\"camera\": {\"pixel_scale_arcsec\": "
+             "3, \"aperture_m\": 0.2, \"width_px\": 64, \"height_px\": 64, "
+             "\"quantum_efficiency\": 0.8, \"throughput\": 0.5, \"background_mag_arcsec2\": 21, "
+             "\"band\": {\"preset\": \"lwir\", \"optics_temperature_k\": 300, "
+             "\"optics_emissivity\": %s, \"optics_beam_factor\": 4}, \"optics\": {\"vignetting\": "
+             "{\"model\": \"polynomial\", \"coefficients\": [-0.5, 0, 0]}}, \"background\": "
+             "{\"starlight\": false, %s}}}]}]}",
+             emissivity, background);
+    bst_world *world = test_world(text);
+    bst_skylight *s;
+    const bst_skylight_map *map = make(world, around, (bst_window){0, 0, 64, 64}, &s);
+    value[0] = bst_skylight_at(map, 32, 32);
+    value[1] = bst_skylight_at(map, 0, 0);
+    value[2] = bst_skylight_at(map, 63, 63);
+    bst_skylight_free(s);
+    bst_world_free(world);
+}
+
+/* Light of warm optics is added once, whatever the sky is, and is not vignetted: with an emissivity
+ * of 0.1 over four times the beam 4.11576e9 e/s (test_band.c, by hand), without emission none. The
+ * exposure lasts 3 s. */
+static void warm_optics_count_once(void **state) {
+    (void)state;
+    static const char *const models[] = {"\"stray_e_per_s\": 1", "\"model\": \"sky\""};
+    bst_scene_surroundings around = look_down((bst_vec3){4.2e7, 0, 0}, 2);
+    around.exposure_s = 3;
+    for (int m = 0; m < 2; m++) {
+        double warm[3], cold[3];
+        lwir_background("0.1", models[m], &around, warm);
+        lwir_background("0", models[m], &around, cold);
+        for (int place = 0; place < 2; place++) {
+            assert_true(cold[place] >= 0 && cold[place] < 1e-6 * warm[place]);
+            /* digits of the number above, and floats */
+            bst_assert_close(warm[place] / (3 * 4.11576e9), 1, 1e-4);
+        }
+    }
+}
+
+/* The night side of an Earth of 300 K fills the field, or the part beyond a limb that passes
+ * through its middle, in the equator's plane: 2.43206e19 e/s for each sr (test_band.c, by hand) of
+ * pixels of 2.11539e-10 sr, less at the corner, where 1 - r^2 / 2 of it passes. */
+static void heat_of_the_earth_is_vignetted(void **state) {
+    (void)state;
+    bst_scene_surroundings around = look_down((bst_vec3){-4.2e7, 0, 0}, BST_PI);
+    around.exposure_s = 3;
+    double value[3];
+    lwir_background("0", "\"model\": \"sky\", \"earth_temperature_k\": 300", &around, value);
+    for (int place = 0; place < 2; place++) {
+        double px = place ? 31.5 : 0.5, passed = 1 - 0.5 * (2 * px * px) / (2 * 32 * 32);
+        /* digits of the numbers above, and floats */
+        bst_assert_close(value[place] / (3 * 2.43206e19 * 2.11539e-10 * passed), 1, 1e-4);
+    }
+    around = look_down((bst_vec3){-4.2e7, 0, 0}, BST_PI - asin(BST_EARTH_RADIUS_M / 4.2e7));
+    around.exposure_s = 1e-3;
+    lwir_background("0", "\"model\": \"sky\", \"earth_temperature_k\": 300", &around, value);
+    double lower = fmin(value[1], value[2]), upper = fmax(value[1], value[2]);
+    double passed = 1 - 0.5 * 2 * 31.5 * 31.5 / (2 * 32 * 32);
+    bst_assert_close(upper / (1e-3 * 2.43206e19 * 2.11539e-10 * passed), 1, 1e-4);
+    assert_true(lower >= 0 && lower < 1e-6 * upper);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges_are_drawn_pixel_by_pixel),
         cmocka_unit_test(places_agree_with_the_whole_map),
         cmocka_unit_test(interpolated_squares_are_right),
         cmocka_unit_test(other_edges_are_right),
+        cmocka_unit_test(warm_optics_count_once),
+        cmocka_unit_test(heat_of_the_earth_is_vignetted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,7 +21,10 @@ typedef struct exposure_clock {
     } set;                        /* by the scenario */
     bst_window full, own, window; /* of the sensor, of the scenario, of the current exposure */
     int binning;
-    bool single_pixels;        /* the detector reads a ramp: frames are not binned */
+    struct {
+        bool exposure, period, binning, window;
+    } changed;          /* by the scenario since the state was saved: from the next exposure on */
+    bool single_pixels; /* the detector reads a ramp: frames are not binned */
     double pixel_scale_arcsec; /* 0: the camera's scale */
     bst_frame_cursor updates;  /* exposures from a file, frame by frame; updates NULL: none */
     double dropped_fraction;
@@ -273,8 +276,26 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
     clock->binning = clock->binning < side ? clock->binning : side;
 }
 
+/* Takes the settings that the scenario has changed. */
+static void take_changes(exposure_clock *clock) {
+    if (clock->changed.exposure) {
+        clock->exposure_ticks = clock->set.exposure_ticks;
+    }
+    if (clock->changed.period) {
+        clock->period_ticks = clock->set.period_ticks;
+    }
+    if (clock->changed.binning) {
+        clock->binning = (int)clock->set.binning;
+    }
+    if (clock->changed.window) {
+        clock->window = clock->own;
+    }
+    memset(&clock->changed, 0, sizeof clock->changed);
+}
+
 /* Opens an exposure: latches the sensor command and fixes start and end ticks. */
 static void open_exposure(exposure_clock *clock, bst_sample command) {
+    take_changes(clock);
     if (clock->updates.updates) { /* updates from a file take precedence over commands */
         clock->exposure_ticks = clock->updates.exposure_ticks;
         clock->period_ticks = clock->updates.period_ticks;
@@ -327,21 +348,17 @@ static bst_status step(void *self, struct bst_step *step) {
     }
 }
 
-/* Settings that the scenario has changed since the state was saved hold from the next exposure on.
- */
-static void take_changes(exposure_clock *clock, const exposure_clock *saved) {
-    if (saved->set.exposure_ticks != clock->set.exposure_ticks) {
-        clock->exposure_ticks = clock->set.exposure_ticks;
-    }
-    if (saved->set.period_ticks != clock->set.period_ticks) {
-        clock->period_ticks = clock->set.period_ticks;
-    }
-    if (saved->set.binning != clock->set.binning) {
-        clock->binning = (int)clock->set.binning;
-    }
+/* Notes the settings that the scenario has changed since the state was saved. They hold from the
+ * next exposure on; the sensor itself has changed at once. */
+static void note_changes(exposure_clock *clock, const exposure_clock *saved) {
+    clock->changed.exposure |= saved->set.exposure_ticks != clock->set.exposure_ticks;
+    clock->changed.period |= saved->set.period_ticks != clock->set.period_ticks;
+    clock->changed.binning |= saved->set.binning != clock->set.binning;
+    clock->changed.window |= memcmp(&saved->own, &clock->own, sizeof saved->own) != 0;
     clock->binning =
         clock->single_pixels ? 1 : clock->binning; /* commanded before there was a ramp */
-    if (memcmp(&saved->own, &clock->own, sizeof saved->own) != 0) {
+    const bst_window *w = &clock->window;
+    if (w->x0 + w->width > clock->full.width || w->y0 + w->height > clock->full.height) {
         clock->window = clock->own;
     }
 }
@@ -356,6 +373,10 @@ static bst_status archive(void *self, bst_archive *archive) {
     BST_ARCHIVE(archive, clock->window);
     BST_ARCHIVE(archive, clock->binning);
     BST_ARCHIVE(archive, clock->pixel_scale_arcsec);
+    bst_archive_bool(archive, &clock->changed.exposure);
+    bst_archive_bool(archive, &clock->changed.period);
+    bst_archive_bool(archive, &clock->changed.binning);
+    bst_archive_bool(archive, &clock->changed.window);
     bst_archive_bool(archive, &clock->in_burst);
     BST_ARCHIVE(archive, clock->id);
     BST_ARCHIVE(archive, clock->start_tick);
@@ -363,7 +384,7 @@ static bst_status archive(void *self, bst_archive *archive) {
     bst_archive_bool(archive, &clock->open);
     bst_frame_cursor_archive(&clock->updates, archive);
     if (bst_archive_is_restoring(archive)) {
-        take_changes(clock, &saved);
+        note_changes(clock, &saved);
     }
     return BST_OK;
 }
