@@ -106,15 +106,13 @@ bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) {
     return BST_OK;
 }
 
-/* Part of a source's predicted error that is not of its nodes' missed highest moments. */
+/* Part of the predicted error of a source's nodes that is not of their missed highest moments. */
 static double higher_part(const bst_smear *s, const bst_smear_drawn *d) {
-    double nodes = d->predicted - d->level->predicted_profile, square = d->scale * d->scale;
+    double square = d->scale * d->scale;
     int k = BST_NODE_SCALES - 2;
     for (; k > 0 && square < 1.0; k--, square *= 2.0) {
     }
-    return s->sensitivity && d->predicted > 0.0
-               ? 1.0 - (1.0 - d->level->higher_part[k]) * fmax(nodes, 0.0) / d->predicted
-               : 1.0;
+    return s->sensitivity ? d->level->higher_part[k] : 1.0;
 }
 
 /* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
@@ -135,12 +133,27 @@ static double flank_of(const bst_smear *s, const bst_smear_drawn *d, double boun
                       : any;
 }
 
+/* The same of the error of profiles, which widens a point along x and y: by the steps of the grid's
+ * phases, and of the widths. */
+static double profile_flank_of(const bst_smear *s, double bound) {
+    enum { ALONG_X = 0, ALONG_Y = BST_NODE_DIRECTIONS / 2, SECOND_ORDER = 0 };
+    double light = s->last_read_e / s->dark_variance_e2;
+    if (!s->sensitivity) {
+        return fmax(bst_flank_curve_at(&s->flanks[BST_FLANK_POINT], light), bound);
+    }
+    const bst_flank_curve(*of)[3] = s->sensitivity->flank[BST_FLANK_POINT];
+    return fmax(bst_flank_curve_at(&of[ALONG_X][SECOND_ORDER], light),
+                bst_flank_curve_at(&of[ALONG_Y][SECOND_ORDER], light));
+}
+
 /* Sets the image errors of a source at (x, y), wherever it falls. */
 void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
     int radius = d->radius;
     double travel_px = d->travel_px;
     double lost = bst_stamp_excess(&s->stamp, radius), peak_e = s->last_read_e;
-    double error = d->error + s->chord_error, predicted = d->predicted + s->chord_error;
+    double error = d->error + s->chord_error;
+    double profile = fmin(d->level->predicted_profile, d->predicted);
+    double predicted = d->predicted - profile + s->chord_error;
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
     /* rounding of fixed-point positions, of the float offset to the node, and of some sums */
     double rounded = 0.86 / s->sigma_px * (1.0 / s->place_parts + 0x1p-24 * travel_px) + 0x1p-22;
@@ -156,7 +169,9 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
         .y_px = (float)d->y,
         .peak_e = (float)peak_e,
         .nodes_e = (float)((flank * error + rounded) * peak_e + s->body_sigma * sigma_e),
-        .predicted_e = (float)((flank_of(s, d, flank) * predicted + rounded) * peak_e +
+        .predicted_e = (float)((flank_of(s, d, flank) * predicted +
+                                profile_flank_of(s, flank) * profile + rounded) *
+                                   peak_e +
                                s->body_sigma * sigma_e),
         .shared_e = (float)(shared * sigma_e),
         .excess_e = (float)(lost * peak_e),

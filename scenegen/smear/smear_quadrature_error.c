@@ -115,11 +115,16 @@ void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_si
     enum { ANCHORS = 24 };
     double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst[BST_NODE_PARTS] = {0.0};
     double least = INFINITY, narrowest = INFINITY, light = 0.0, sum[BST_NODE_PARTS] = {0.0};
-    int brightest = 0;
+    int brightest[2] = {0, 0}; /* by the bound, and by the predicted error */
     for (int n = 0; n < count; n++) {
         const bst_smear_node *at = &nodes[n];
-        double error = at->error * at->weight;
-        brightest = error > nodes[brightest].error * nodes[brightest].weight ? n : brightest;
+        const bst_smear_node *most[2] = {&nodes[brightest[0]], &nodes[brightest[1]]};
+        if (at->error * at->weight > most[0]->error * most[0]->weight) {
+            brightest[0] = n;
+        }
+        if (at->predicted * at->weight > most[1]->predicted * most[1]->weight) {
+            brightest[1] = n;
+        }
         const double value[BST_NODE_PARTS] = {at->error, at->predicted, at->variance};
         for (int i = 0; i < BST_NODE_PARTS; i++) {
             worst[i] = value[i] > worst[i] ? value[i] : worst[i];
@@ -135,8 +140,8 @@ void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_si
         return;
     }
     int stride = count / ANCHORS + 1;
-    for (int a = -1; a < count; a = a < 0 ? 0 : a + stride) {
-        const bst_smear_node *at = &nodes[a < 0 ? brightest : a];
+    for (int a = -2; a < count; a += a < 0 ? 1 : stride) {
+        const bst_smear_node *at = &nodes[a < 0 ? brightest[a + 2] : a];
         double here = 0.0, missed = 0.0, predicted = 0.0, widened = 0.0;
         for (int n = 0; n < count; n++) {
             const double *p = nodes[n].p;
