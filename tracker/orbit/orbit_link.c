@@ -7,6 +7,9 @@
 /* standard deviations of chi-square beyond its expectation, up to which an arc fits */
 static const double MOST_SIGMAS = 5.0;
 
+/* least_gain of fits: chi-square is compared with a limit */
+static const double LEAST_GAIN = 1e-3;
+
 /* Largest chi-square of directions that fit an orbit. */
 static double most_chi2(int count) {
     const double dof = 2.0 * count - 6.0;
@@ -51,7 +54,7 @@ static int join(const bst_od_linked *item, const bst_od_observation *arc, int co
 /* Fits an orbit to an item's directions and those of an arc. False: they do not fit. */
 static bool fits(const bst_od_linked *item, const bst_od_motion *motion,
                  const bst_od_observation *arc, int count, bst_od_linked *out) {
-    const bst_od_options options = {.motion = *motion};
+    const bst_od_options options = {.motion = *motion, .least_gain = LEAST_GAIN};
     bst_ctx quiet = {0};
     bst_od_solution found;
     out->count = join(item, arc, count, out->directions);

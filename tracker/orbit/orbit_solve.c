@@ -16,6 +16,9 @@ enum {
 /* Length of the first part of the arc, if it contains enough observations. */
 static const double FIRST_SPAN_S = 1800.0;
 
+/* least_gain of fits that others start from */
+static const double START_GAIN = 1e-3;
+
 typedef struct part {
     int first, last; /* inclusive */
 } part;
@@ -93,7 +96,7 @@ static int by_chi2(const void *a, const void *b) {
 static bst_status fit_candidates(bst_ctx *ctx, const bst_od_observation *items, int count,
                                  started out[BST_OD_CANDIDATES], int *found, int *tried) {
     bst_od_candidate candidates[BST_OD_CANDIDATES];
-    const bst_od_options options = {0};
+    const bst_od_options options = {.least_gain = START_GAIN};
     BST_TRY(bst_od_initial(ctx, items, count, candidates, tried));
     bst_ctx quiet = {0};
     bst_status worst = BST_OK;
@@ -152,6 +155,7 @@ static bst_status extend_to_arc(bst_ctx *ctx, const arc *a, part p, double span_
     double whole = time_of(o, count - 1) - time_of(o, 0);
     bst_od_options growing = *a->options;
     growing.scale_variance = false;
+    growing.least_gain = START_GAIN;
     while (span_s < whole) {
         int n = p.last - p.first + 1;
         span_s *= 2.0;
@@ -246,8 +250,11 @@ static bst_status solve_arc(bst_ctx *ctx, const arc *a, double *residual_chi2, b
             return status;
         }
         /* a longer part may determine what a shorter one does not */
-        span_s *= 2.0;
-        p = densest_part(o, count, span_s);
+        const part failed = p;
+        while (span_s < whole && p.first == failed.first && p.last == failed.last) {
+            span_s *= 2.0;
+            p = densest_part(o, count, span_s);
+        }
     }
 }
 
