@@ -29,6 +29,7 @@ typedef struct bst_od_options {
     /* share of chi-square below which a decrease that the linear model promises ends the iteration;
      * 0: 1e-9. A start for another fit, or a comparison with a limit, needs no more than 1e-3 */
     double least_gain;
+    int most_iterations; /* beyond which the fit counts as not convergent; 0: 60 */
 } bst_od_options;
 
 typedef struct bst_od_solution {

@@ -16,8 +16,9 @@ enum {
 /* Length of the first part of the arc, if it contains enough observations. */
 static const double FIRST_SPAN_S = 1800.0;
 
-/* least_gain of fits that others start from */
+/* Fits that others start from: least_gain; most_iterations, which one start of many needs. */
 static const double START_GAIN = 1e-3;
+enum { START_ITERATIONS = 30 };
 
 typedef struct part {
     int first, last; /* inclusive */
@@ -96,7 +97,8 @@ static int by_chi2(const void *a, const void *b) {
 static bst_status fit_candidates(bst_ctx *ctx, const bst_od_observation *items, int count,
                                  started out[BST_OD_CANDIDATES], int *found, int *tried) {
     bst_od_candidate candidates[BST_OD_CANDIDATES];
-    const bst_od_options options = {.least_gain = START_GAIN};
+    const bst_od_options options = {.least_gain = START_GAIN,
+                                    .most_iterations = START_ITERATIONS};
     BST_TRY(bst_od_initial(ctx, items, count, candidates, tried));
     bst_ctx quiet = {0};
     bst_status worst = BST_OK;
