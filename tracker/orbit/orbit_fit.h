@@ -30,6 +30,8 @@ typedef struct bst_od_options {
      * 0: 1e-9. A start for another fit, or a comparison with a limit, needs no more than 1e-3 */
     double least_gain;
     int most_iterations; /* beyond which the fit counts as not convergent; 0: 60 */
+    /* bst_od_determine: initial orbits, best first, that may fail before one converges; 0: all */
+    int most_failures;
 } bst_od_options;
 
 typedef struct bst_od_solution {

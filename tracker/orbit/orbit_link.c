@@ -8,9 +8,9 @@
 static const double MOST_SIGMAS = 5.0;
 
 /* Fits of pairs, most of which are hopeless: least_gain, as chi-square is compared with a limit;
- * and most_iterations. */
+ * most_iterations and most_failures. */
 static const double LEAST_GAIN = 1e-3;
-enum { MOST_ITERATIONS = 25 };
+enum { MOST_ITERATIONS = 25, MOST_FAILURES = 4 };
 /* Observers nearer to each other than this are one, m: the error of uniform motion in ten
  * seconds is less. */
 static const double ITSELF_M = 500.0;
@@ -77,8 +77,10 @@ static bool is_beside(const bst_od_linked *item, const bst_od_observation *arc, 
 /* Fits an orbit to an item's directions and those of an arc. False: they do not fit. */
 static bool fits(const bst_od_linked *item, const bst_od_motion *motion,
                  const bst_od_observation *arc, int count, bst_od_linked *out) {
-    const bst_od_options options = {
-        .motion = *motion, .least_gain = LEAST_GAIN, .most_iterations = MOST_ITERATIONS};
+    const bst_od_options options = {.motion = *motion,
+                                    .least_gain = LEAST_GAIN,
+                                    .most_iterations = MOST_ITERATIONS,
+                                    .most_failures = MOST_FAILURES};
     bst_ctx quiet = {0};
     bst_od_solution found;
     out->count = join(item, arc, count, out->directions);

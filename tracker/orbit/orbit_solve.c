@@ -95,7 +95,7 @@ static int by_chi2(const void *a, const void *b) {
 
 /* Fits each candidate orbit to the first part with two-body motion; converged ones, best first. */
 static bst_status fit_candidates(bst_ctx *ctx, const bst_od_observation *items, int count,
-                                 started out[BST_OD_CANDIDATES], int *found, int *tried) {
+                                 int most_failures, started out[BST_OD_CANDIDATES], int *found, int *tried) {
     bst_od_candidate candidates[BST_OD_CANDIDATES];
     const bst_od_options options = {.least_gain = START_GAIN,
                                     .most_iterations = START_ITERATIONS};
@@ -104,7 +104,8 @@ static bst_status fit_candidates(bst_ctx *ctx, const bst_od_observation *items, 
     bst_status worst = BST_OK;
     bool hyperbolic = false;
     *found = 0;
-    for (int i = 0; i < *tried; i++) {
+    const int most = most_failures > 0 && most_failures < *tried ? most_failures : *tried;
+    for (int i = 0; i < *tried && (*found > 0 || i < most); i++) {
         bst_od_solution solution;
         bst_status status =
             bst_od_fit(&quiet, items, count, &options, &candidates[i].state, NULL, &solution);
@@ -186,7 +187,7 @@ static bst_status solve_from(bst_ctx *ctx, const arc *a, part p, double span_s,
                              double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
     started starts[BST_OD_CANDIDATES];
     int found, used = select_evenly(a->items, p, FIRST_SAMPLES, a->room);
-    BST_TRY(fit_candidates(ctx, a->room, used, starts, &found, &report->candidates));
+    BST_TRY(fit_candidates(ctx, a->room, used, a->options->most_failures, starts, &found, &report->candidates));
     bst_status status = BST_OK;
     bool done = false;
     bst_ctx quiet = {0};
