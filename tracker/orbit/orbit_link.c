@@ -56,8 +56,8 @@ static int join(const bst_od_linked *item, const bst_od_observation *arc, int co
     return n;
 }
 
-/* Whether an arc and one that waits are of two tracks which an observer had at the same time, and so
- * of two objects. */
+/* Whether an arc and one that waits are of two tracks which an observer had at the same time, and
+ * so of two objects. */
 static bool is_beside(const bst_od_linked *item, const bst_od_observation *arc, int count) {
     const bst_od_observation *own = item->directions;
     const double from_s = arc[0].observer.time_s, to_s = arc[count - 1].observer.time_s;

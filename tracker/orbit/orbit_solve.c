@@ -95,10 +95,10 @@ static int by_chi2(const void *a, const void *b) {
 
 /* Fits each candidate orbit to the first part with two-body motion; converged ones, best first. */
 static bst_status fit_candidates(bst_ctx *ctx, const bst_od_observation *items, int count,
-                                 int most_failures, started out[BST_OD_CANDIDATES], int *found, int *tried) {
+                                 int most_failures, started out[BST_OD_CANDIDATES], int *found,
+                                 int *tried) {
     bst_od_candidate candidates[BST_OD_CANDIDATES];
-    const bst_od_options options = {.least_gain = START_GAIN,
-                                    .most_iterations = START_ITERATIONS};
+    const bst_od_options options = {.least_gain = START_GAIN, .most_iterations = START_ITERATIONS};
     BST_TRY(bst_od_initial(ctx, items, count, candidates, tried));
     bst_ctx quiet = {0};
     bst_status worst = BST_OK;
@@ -187,7 +187,8 @@ static bst_status solve_from(bst_ctx *ctx, const arc *a, part p, double span_s,
                              double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
     started starts[BST_OD_CANDIDATES];
     int found, used = select_evenly(a->items, p, FIRST_SAMPLES, a->room);
-    BST_TRY(fit_candidates(ctx, a->room, used, a->options->most_failures, starts, &found, &report->candidates));
+    BST_TRY(fit_candidates(ctx, a->room, used, a->options->most_failures, starts, &found,
+                           &report->candidates));
     bst_status status = BST_OK;
     bool done = false;
     bst_ctx quiet = {0};
