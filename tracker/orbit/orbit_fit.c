@@ -259,7 +259,7 @@ static bst_status fail_to_converge(const work *w, const double n[PARAMETERS][PAR
                     most_iterations(w->options));
 }
 
-/* A promise of the linear model holds for steps that are hardly damped. */
+/* What the linear model predicts holds for steps that are hardly damped. */
 static const double MOST_DAMPING = 1.0;
 
 /* Levenberg-Marquardt iteration over the observations in use. */
@@ -273,7 +273,7 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
         BST_TRY(residual_jacobian(w, c));
         normal_equations(w, n, b);
         bool better = false;
-        double predicted = INFINITY, promised = INFINITY;
+        double predicted = INFINITY, linear_gain = INFINITY;
         for (int attempt = 0; attempt < 12 && !better; attempt++) {
             if (!factor_damped(n, damping, 1e-16, l, size)) {
                 damping = fmax(10.0 * damping, 1e-12);
@@ -284,7 +284,7 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
             for (int i = 0; i < PARAMETERS; i++) {
                 predicted += b[i] * x[i];
             }
-            promised = attempt == 0 && damping <= MOST_DAMPING ? predicted : promised;
+            linear_gain = attempt == 0 && damping <= MOST_DAMPING ? predicted : linear_gain;
             limit_step(x);
             chart next = moved(c, x);
             state = state_of(&next);
@@ -304,7 +304,7 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
                 damping = fmax(10.0 * damping, 1e-12);
             }
         }
-        if (predicted < 1e-6 + 1e-9 * cost || promised < w->options->least_gain * cost) {
+        if (predicted < 1e-6 + 1e-9 * cost || linear_gain < w->options->least_gain * cost) {
             return BST_OK;
         }
         if (!better) {
