@@ -78,7 +78,8 @@ bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
 
 /* A zero background map, for requests without one. */
 static const float nothing[4];
-static const bst_skylight_map no_background = {1 << 16, 0, 0, 2, 2, nothing, 0.0, NULL};
+static const bst_skylight_map no_background = {
+    .step_px = 1 << 16, .columns = 2, .rows = 2, .e = nothing};
 
 const bst_skylight_map *bst_render_background(const bst_render_request *q) {
     return q->background ? q->background : &no_background;

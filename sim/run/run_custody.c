@@ -24,6 +24,8 @@ enum { IDENTITY = 10 };
  * which it is no candidate, m; and standard deviations of its own position. */
 #define TABLE_REACH_M (4.1 * 11500.0 + 1000.0)
 #define CANDIDATE_SIGMAS 6.0
+/* time for which the bounds of these distances hold, s */
+#define REACH_FOR_S 3600.0
 /* The light of an object may be in an image within one FWHM and so many standard deviations of its
  * predicted direction, but two FWHM at most: farther apart two images are resolved. */
 #define BLEND_SIGMAS 2.0
@@ -44,6 +46,9 @@ struct bst_run_custody {
     bst_custody_filter *filters;
     bst_custody_score *scores;
     double *place_m[3]; /* [object] */
+    /* [object] bound of the distance from a line of sight, m, from an hour before until
+     * reach_until_s: few filters are looked at */
+    double *reach_m, reach_until_s;
     bst_run_arcs *arcs;
     bst_run_candidates *candidates;
     bst_run_new_objects new_objects;
@@ -59,7 +64,7 @@ static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
     c->orbits = calloc(n, sizeof *c->orbits);
     c->filters = calloc(n, sizeof *c->filters);
     c->scores = calloc(n, sizeof *c->scores);
-    c->place_m[0] = calloc(3 * n, sizeof *c->place_m[0]);
+    c->place_m[0] = calloc(4 * n, sizeof *c->place_m[0]);
     if (!c->pixel_rad || !c->orbits || !c->filters || !c->scores || !c->place_m[0]) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of %d objects",
                         c->object_count);
@@ -67,6 +72,8 @@ static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
     c->fwhm_rad = c->pixel_rad + sensors;
     c->place_m[1] = c->place_m[0] + n;
     c->place_m[2] = c->place_m[1] + n;
+    c->reach_m = c->place_m[2] + n;
+    c->reach_until_s = -INFINITY;
     return BST_OK;
 }
 
@@ -214,6 +221,7 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
     for (int i = 0; i < c->object_count; i++) {
         archive_object(c, i, archive);
     }
+    c->reach_until_s = -INFINITY;
     BST_TRY(bst_run_arcs_archive(c->arcs, archive));
     BST_TRY(bst_run_candidates_archive(c->candidates, c->object_count, archive));
     BST_TRY(bst_run_new_objects_archive(&c->new_objects, c->object_count, archive));
@@ -223,16 +231,10 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
 
 /* ---- correlation ---- */
 
-/* Whether an object at a tabulated position may be on the line of sight. */
-static bool may_be(const bst_custody_orbit *orbit, const bst_custody_filter *f, bst_vec3 place,
-                   const bst_custody_observation *z) {
-    if (isnan(place.x)) {
-        return true;
-    }
-    bst_vec3 line = bst_vec3_sub(place, z->observer.position_m);
-    double along = bst_vec3_dot(line, z->direction);
-    double across2 = bst_vec3_dot(line, line) - along * along;
-    double days = z->observer.time_s / BST_DAY_S, variance = 0.0;
+/* Distance of an object's tabulated position from a line of sight beyond which it is not on it, m.
+ */
+static double reach_of(const bst_custody_orbit *orbit, const bst_custody_filter *f, double time_s) {
+    double days = time_s / BST_DAY_S, variance = 0.0;
     for (int k = BST_CUSTODY_ECC_X; k < BST_CUSTODY_ALONG; k++) {
         variance += f->p[k][k];
     }
@@ -242,8 +244,32 @@ static bool may_be(const bst_custody_orbit *orbit, const bst_custody_filter *f, 
                 (f->p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] +
                  days * (2.0 * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] +
                          days * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT]));
-    double reach = TABLE_REACH_M + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
-    return along > -reach && across2 < reach * reach;
+    return TABLE_REACH_M + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
+}
+
+/* Whether an object at a tabulated position may be on the line of sight. */
+static bool may_be(double reach_m, bst_vec3 place, const bst_custody_observation *z) {
+    bst_vec3 line = bst_vec3_sub(place, z->observer.position_m);
+    double along = bst_vec3_dot(line, z->direction);
+    double across2 = bst_vec3_dot(line, line) - along * along;
+    return isnan(place.x) || (along > -reach_m && across2 < reach_m * reach_m);
+}
+
+/* Sets the bound of an object: the variance is a quadratic function of time with one minimum, and
+ * so largest at an end of the time for which it holds. */
+static void bound_reach(bst_run_custody *c, int i) {
+    c->reach_m[i] =
+        fmax(reach_of(&c->orbits[i], &c->filters[i], c->reach_until_s - 2.0 * REACH_FOR_S),
+             reach_of(&c->orbits[i], &c->filters[i], c->reach_until_s));
+}
+
+static void bound_reaches(bst_run_custody *c, double time_s) {
+    if (!(time_s <= c->reach_until_s && time_s >= c->reach_until_s - 2.0 * REACH_FOR_S)) {
+        c->reach_until_s = time_s + REACH_FOR_S;
+        for (int i = 0; i < c->object_count; i++) {
+            bound_reach(c, i);
+        }
+    }
 }
 
 /* Objects in the gate of an observation. Indices from object_count on are those of new objects. */
@@ -293,7 +319,7 @@ static void find_new_object(bst_run_custody *c, int sensor, const bst_custody_ob
             continue;
         }
         place = bst_mat3_mul_vec(&z->gcrf_from_teme, place);
-        if (may_be(&o->orbit, &o->filter, place, z)) {
+        if (may_be(reach_of(&o->orbit, &o->filter, z->observer.time_s), place, z)) {
             compare_object(&o->orbit, &o->filter, c->object_count + i, c->fwhm_rad[sensor], z, out);
         }
     }
@@ -307,12 +333,14 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
     const double time_s = z->observer.time_s;
     const bst_world_state eye = {z->observer.position_m, z->observer.velocity_mps};
     double nearest = TRACK_PX * c->pixel_rad[sensor];
+    bound_reaches(c, time_s);
     (void)bst_world_places(c->world, time_s, c->place_m[0], c->place_m[1], c->place_m[2]);
     for (int i = 0; i < c->object_count; i++) {
         const bst_vec3 place = {c->place_m[0][i], c->place_m[1][i], c->place_m[2][i]};
         bst_world_sight sight;
         bst_ctx quiet = {0}; /* an orbit that has ended is no error here */
-        if (!may_be(&c->orbits[i], &c->filters[i], place, z) ||
+        if (!may_be(c->reach_m[i], place, z) ||
+            !may_be(reach_of(&c->orbits[i], &c->filters[i], time_s), place, z) ||
             bst_world_view_sight_from(&quiet, c->view, &eye, i, time_s, &sight) != BST_OK ||
             sight.range_m < ITSELF_M) {
             continue;
@@ -324,6 +352,7 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
         }
         if (c->orbits[i].a_m > 0.0) {
             bst_custody_add_process_noise(&c->config, time_s, &c->filters[i]);
+            bound_reach(c, i);
             compare_object(&c->orbits[i], &c->filters[i], i, c->fwhm_rad[sensor], z, out);
         }
     }
@@ -357,6 +386,7 @@ static bool is_object(bst_run_custody *c, int object, const bst_run_new_object *
 static bst_status add_new_object(bst_ctx *ctx, bst_run_custody *c, const bst_run_new_object *o) {
     const double time_s = -o->orbit.epoch_offset_s;
     int found = 0, which = -1;
+    c->reach_until_s = -INFINITY; /* filters change */
     for (int i = 0; i < c->object_count; i++) {
         bool same = is_object(c, i, o, time_s);
         found += same;
@@ -395,6 +425,9 @@ static double note_update(bst_run_custody *c, const match *m, double time_s) {
     const bool crossed = own < 0 || own != m->true_object;
     c->figures.new_tracks += is_new;
     c->figures.cross_tags += crossed;
+    if (!is_new) {
+        bound_reach(c, m->best);
+    }
     bst_custody_score_add(is_new ? &o->score : &c->scores[m->best], crossed, m->chi2, time_s);
     return is_new ? NAN : bst_custody_nees(&c->filters[m->best]);
 }

@@ -178,10 +178,31 @@ static void a_linker_is_saved_and_restored(void **state) {
     }
 }
 
+/* Two tracks that an observer has at a time are of two objects, however well one orbit fits them; a
+ * later one of either is linked. */
+static void tracks_at_one_time_are_not_linked(void **state) {
+    (void)state;
+    static bst_od_linker l;
+    const bst_od_motion motion = {.forces = NULL};
+    bst_od_observation z[DIRECTIONS];
+    l = (bst_od_linker){.count = 0};
+    for (int k = 0; k < 2; k++) {
+        arc_of(0, 600.0 + k, k, z);
+        assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S), k);
+        assert_int_equal(l.items[k].arcs, 1);
+    }
+    arc_of(0, 8000.0, 2, z);
+    const int at = bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S);
+    assert_int_equal(l.items[at].arcs, 2);
+    assert_int_equal(l.count, 2);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(arcs_of_an_object_are_linked), cmocka_unit_test(old_arcs_are_given_up),
-        cmocka_unit_test(directions_are_thinned_out), cmocka_unit_test(items_are_dropped),
-        cmocka_unit_test(a_linker_is_saved_and_restored)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(tracks_at_one_time_are_not_linked),
+                                       cmocka_unit_test(arcs_of_an_object_are_linked),
+                                       cmocka_unit_test(old_arcs_are_given_up),
+                                       cmocka_unit_test(directions_are_thinned_out),
+                                       cmocka_unit_test(items_are_dropped),
+                                       cmocka_unit_test(a_linker_is_saved_and_restored)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

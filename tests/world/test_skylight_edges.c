@@ -234,6 +234,65 @@ static void heat_of_the_earth_is_vignetted(void **state) {
     assert_true(lower >= 0 && lower < 1e-6 * upper);
 }
 
+/* Where the bound says that no edge and no terminator begins, none is in the field; it says so for
+ * more than half of the views that have none. With none, nodes that are computed as they are asked
+ * for are those of the whole map, to the bit. */
+static void bounds_of_edges_hold(void **state) {
+    (void)state;
+    enum { VIEWS = 400, SIDE = 13 };
+    bst_world *world = test_world(SKY_WORLD("300", "\"model\": \"sky\""));
+    const bst_camera *camera = bst_world_camera(world, 0, 0);
+    const double scale = bst_camera_scale_rad(camera), radius = 150.0 * sqrt(2.0) * scale;
+    bst_ctx ctx = {0};
+    bst_skylight *by_need;
+    bst_assert_ok(&ctx, bst_skylight_create(&ctx, world, camera, &by_need));
+    bst_skylight_set_places_only(by_need);
+    int said = 0, none = 0, compared = 0;
+    for (int view = 0; view < VIEWS; view++) {
+        const double distance_m = view % 2 ? 4.2164e7 : 7.2e6;
+        const double limb = asin(BST_EARTH_RADIUS_M / distance_m);
+        const double off = 1.1 * limb * (2.0 * fmod(0.618034 * view, 1.0) - 1.0);
+        bst_scene_surroundings around = look_down((bst_vec3){distance_m, 0, 0}, off);
+        const double sun = 2.0 * BST_PI * fmod(0.414214 * view, 1.0);
+        around.bodies.sun_m = (bst_vec3){BST_AU_M * cos(sun), BST_AU_M * sin(sun), 3e10};
+        around.light.sun_m = bst_vec3_sub(around.bodies.sun_m, around.eye_m);
+        bst_discs discs;
+        bst_discs_make(camera, &around, &discs);
+        double edge = INFINITY;
+        bool day = false, night = false;
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            const double x = i % SIDE * 299.0 / (SIDE - 1), y = i / SIDE * 299.0 / (SIDE - 1);
+            const bst_vec3 d = bst_camera_unproject(camera, x, y);
+            bool lit, dark;
+            bst_discs_daylight(&discs, d, &lit, &dark);
+            edge = fmin(edge, bst_discs_edge_px(&discs, d));
+            day = day || lit;
+            night = night || dark;
+        }
+        const bool says = bst_discs_none_begins(&discs, (bst_vec3){0, 0, 1}, radius, 34.0);
+        const bool has = edge < 34.0 || (day && night);
+        assert_false(says && has);
+        said += says;
+        none += !has;
+        if (!has && bst_discs_any(&discs) && compared < 20) {
+            bst_skylight *all;
+            const bst_window window = {0, 0, 300, 300};
+            const bst_skylight_map *whole = make(world, &around, window, &all), *few;
+            bst_assert_ok(&ctx, bst_skylight_make(&ctx, by_need, &around, window, &few));
+            for (int i = 0; i < 50 && whole->step_px > 1; i++) {
+                const double x = i * 37 % 300, y = i * 91 % 300 + 0.25;
+                assert_true(bst_skylight_at(few, x, y) == bst_skylight_at(whole, x, y));
+            }
+            compared += few->at_nodes != NULL;
+            bst_skylight_free(all);
+        }
+    }
+    assert_true(none < VIEWS && 2 * said > none);
+    assert_int_equal(compared, 20);
+    bst_skylight_free(by_need);
+    bst_world_free(world);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges_are_drawn_pixel_by_pixel),
@@ -242,6 +301,7 @@ int main(void) {
         cmocka_unit_test(other_edges_are_right),
         cmocka_unit_test(warm_optics_count_once),
         cmocka_unit_test(heat_of_the_earth_is_vignetted),
+        cmocka_unit_test(bounds_of_edges_hold),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

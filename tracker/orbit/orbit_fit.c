@@ -139,22 +139,26 @@ static double total_chi2(const work *w, double (*r)[2]) {
     return sum;
 }
 
-/* Jacobian of the residuals by central differences. */
+/* Jacobian of the residuals by central differences; by differences to one side in a fit that ends
+ * early, which needs no covariance to many digits. */
 static bst_status residual_jacobian(work *w, const chart *c) {
     /* the effect of a range displacement grows with the arc: the step is reduced to stay linear */
     double fine = 1e-4 / (1.0 + c->span_s / 600.0);
     const double step[PARAMETERS] = {1e-5, 1e-5, 1e-5, 1e-5, fine, fine};
+    const bool one_sided = w->options->least_gain > 0.0;
     for (int k = 0; k < PARAMETERS; k++) {
-        for (int s = 0; s < 2; s++) {
+        for (int s = 0; s < (one_sided ? 1 : 2); s++) {
             double x[PARAMETERS] = {0.0};
             x[k] = s ? -step[k] : step[k];
             chart near = moved(c, x);
             bst_od_state state = state_of(&near);
             BST_TRY(residuals(w, &state, w->side[s]));
         }
+        double(*const low)[2] = one_sided ? w->residual : w->side[1];
+        const double apart = one_sided ? step[k] : 2.0 * step[k];
         for (int i = 0; i < w->count; i++) {
             for (int j = 0; j < 2; j++) {
-                w->slope[i][k][j] = (w->side[0][i][j] - w->side[1][i][j]) / (2.0 * step[k]);
+                w->slope[i][k][j] = (w->side[0][i][j] - low[i][j]) / apart;
             }
         }
     }
@@ -233,6 +237,10 @@ static bst_status fail_range(const work *w) {
         w->count, w->items[w->count - 1].observer.time_s - w->items[0].observer.time_s);
 }
 
+static int most_iterations(const bst_od_options *options) {
+    return options->most_iterations > 0 ? options->most_iterations : MAX_ITERATIONS;
+}
+
 /* Error of an iteration that did not converge: an undetermined range has no minimum. */
 static bst_status fail_to_converge(const work *w, const double n[PARAMETERS][PARAMETERS]) {
     double l[PARAMETERS][PARAMETERS], size[PARAMETERS], x[PARAMETERS];
@@ -248,20 +256,24 @@ static bst_status fail_to_converge(const work *w, const double n[PARAMETERS][PAR
                     "the fit of an orbit does not converge in %d iterations: the arc is too short "
                     "for its errors, the object moves beside the observer, or observations are of "
                     "another object; use a longer arc or leave out wrong observations",
-                    MAX_ITERATIONS);
+                    most_iterations(w->options));
 }
+
+/* What the linear model predicts holds for steps that are hardly damped. */
+static const double MOST_DAMPING = 1.0;
 
 /* Levenberg-Marquardt iteration over the observations in use. */
 static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], int *iterations) {
     bst_od_state state = state_of(c);
     BST_TRY(residuals(w, &state, w->residual));
     double cost = total_chi2(w, w->residual), damping = 1e-3;
-    for (*iterations = 1; *iterations <= MAX_ITERATIONS; ++*iterations) {
+    const int most = most_iterations(w->options);
+    for (*iterations = 1; *iterations <= most; ++*iterations) {
         double b[PARAMETERS], l[PARAMETERS][PARAMETERS], size[PARAMETERS], x[PARAMETERS];
         BST_TRY(residual_jacobian(w, c));
         normal_equations(w, n, b);
         bool better = false;
-        double predicted = INFINITY;
+        double predicted = INFINITY, linear_gain = INFINITY;
         for (int attempt = 0; attempt < 12 && !better; attempt++) {
             if (!factor_damped(n, damping, 1e-16, l, size)) {
                 damping = fmax(10.0 * damping, 1e-12);
@@ -272,6 +284,7 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
             for (int i = 0; i < PARAMETERS; i++) {
                 predicted += b[i] * x[i];
             }
+            linear_gain = attempt == 0 && damping <= MOST_DAMPING ? predicted : linear_gain;
             limit_step(x);
             chart next = moved(c, x);
             state = state_of(&next);
@@ -291,7 +304,7 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
                 damping = fmax(10.0 * damping, 1e-12);
             }
         }
-        if (predicted < 1e-6 + 1e-9 * cost) {
+        if (predicted < 1e-6 + 1e-9 * cost || linear_gain < w->options->least_gain * cost) {
             return BST_OK;
         }
         if (!better) {

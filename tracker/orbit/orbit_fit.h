@@ -26,6 +26,12 @@ typedef struct bst_od_options {
     /* estimate one factor on the covariances from the residuals (see
      * bst_od_solution.variance_factor); false: they are taken as true */
     bool scale_variance;
+    /* share of chi-square below which a decrease that the linear model predicts ends the iteration;
+     * 0: 1e-9. A start for another fit, or a comparison with a limit, needs no more than 1e-3 */
+    double least_gain;
+    int most_iterations; /* beyond which the fit counts as not convergent; 0: 60 */
+    /* bst_od_determine: initial orbits, best first, that may fail before one converges; 0: all */
+    int most_failures;
 } bst_od_options;
 
 typedef struct bst_od_solution {

@@ -7,6 +7,14 @@
 /* standard deviations of chi-square beyond its expectation, up to which an arc fits */
 static const double MOST_SIGMAS = 5.0;
 
+/* Fits of pairs, most of which are hopeless: least_gain, as chi-square is compared with a limit;
+ * most_iterations and most_failures. */
+static const double LEAST_GAIN = 1e-3;
+enum { MOST_ITERATIONS = 25, MOST_FAILURES = 4 };
+/* Observers nearer to each other than this are one, m: the error of uniform motion in ten
+ * seconds is less. */
+static const double ITSELF_M = 500.0;
+
 /* Largest chi-square of directions that fit an orbit. */
 static double most_chi2(int count) {
     const double dof = 2.0 * count - 6.0;
@@ -48,10 +56,31 @@ static int join(const bst_od_linked *item, const bst_od_observation *arc, int co
     return n;
 }
 
+/* Whether an arc and one that waits are of two tracks which an observer had at the same time, and
+ * so of two objects. */
+static bool is_beside(const bst_od_linked *item, const bst_od_observation *arc, int count) {
+    const bst_od_observation *own = item->directions;
+    const double from_s = arc[0].observer.time_s, to_s = arc[count - 1].observer.time_s;
+    if (item->arcs > 1 || from_s > own[item->count - 1].observer.time_s ||
+        to_s < own[0].observer.time_s) {
+        return false;
+    }
+    int i = 0;
+    while (i + 1 < item->count && own[i].observer.time_s < from_s) {
+        i++;
+    }
+    const bst_od_observer *a = &own[i].observer, *b = &arc[0].observer;
+    const bst_vec3 moved = bst_vec3_axpy(a->position_m, b->time_s - a->time_s, a->velocity_mps);
+    return bst_vec3_norm(bst_vec3_sub(moved, b->position_m)) < ITSELF_M;
+}
+
 /* Fits an orbit to an item's directions and those of an arc. False: they do not fit. */
 static bool fits(const bst_od_linked *item, const bst_od_motion *motion,
                  const bst_od_observation *arc, int count, bst_od_linked *out) {
-    const bst_od_options options = {.motion = *motion};
+    const bst_od_options options = {.motion = *motion,
+                                    .least_gain = LEAST_GAIN,
+                                    .most_iterations = MOST_ITERATIONS,
+                                    .most_failures = MOST_FAILURES};
     bst_ctx quiet = {0};
     bst_od_solution found;
     out->count = join(item, arc, count, out->directions);
@@ -98,6 +127,7 @@ int bst_od_link_arc(bst_od_linker *l, const bst_od_motion *motion,
             bst_od_linked now = {.arcs = 0}; /* all bytes are in a saved state */
             if ((item->arcs == 1) == (waiting == 1) &&
                 directions[0].observer.time_s - last_s <= within_s &&
+                !is_beside(item, directions, count) &&
                 fits(item, motion, directions, count, &now) &&
                 (chosen < 0 || now.chi2 - 2.0 * now.count < best.chi2 - 2.0 * best.count)) {
                 best = now;

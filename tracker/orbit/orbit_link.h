@@ -27,7 +27,9 @@ typedef struct bst_od_linker {
  * waits. Of several the one with the least chi-square less twice its directions is taken. An arc
  * fits if batch least squares over all directions (bst_od_determine for two arcs, bst_od_fit from
  * the orbit for more) leaves a chi-square within five standard deviations of its expectation. When
- * there is no room, the oldest arc that waits is given up, and without one the oldest orbit.
+ * there is no room, the oldest arc that waits is given up, and without one the oldest orbit. Two
+ * arcs of one observer at the same time are of two objects. Fits that do not converge in 25
+ * iterations, and pairs of which the first four initial orbits fail, count as not fitting.
  *
  * Given:     motion      SGP4 or forces; central motion alone fits no arcs that are hours apart
  *            directions  at least 3, in order of time

@@ -16,6 +16,10 @@ enum {
 /* Length of the first part of the arc, if it contains enough observations. */
 static const double FIRST_SPAN_S = 1800.0;
 
+/* Fits that others start from: least_gain; most_iterations, which one start of many needs. */
+static const double START_GAIN = 1e-3;
+enum { START_ITERATIONS = 30 };
+
 typedef struct part {
     int first, last; /* inclusive */
 } part;
@@ -91,15 +95,17 @@ static int by_chi2(const void *a, const void *b) {
 
 /* Fits each candidate orbit to the first part with two-body motion; converged ones, best first. */
 static bst_status fit_candidates(bst_ctx *ctx, const bst_od_observation *items, int count,
-                                 started out[BST_OD_CANDIDATES], int *found, int *tried) {
+                                 int most_failures, started out[BST_OD_CANDIDATES], int *found,
+                                 int *tried) {
     bst_od_candidate candidates[BST_OD_CANDIDATES];
-    const bst_od_options options = {0};
+    const bst_od_options options = {.least_gain = START_GAIN, .most_iterations = START_ITERATIONS};
     BST_TRY(bst_od_initial(ctx, items, count, candidates, tried));
     bst_ctx quiet = {0};
     bst_status worst = BST_OK;
     bool hyperbolic = false;
     *found = 0;
-    for (int i = 0; i < *tried; i++) {
+    const int most = most_failures > 0 && most_failures < *tried ? most_failures : *tried;
+    for (int i = 0; i < *tried && (*found > 0 || i < most); i++) {
         bst_od_solution solution;
         bst_status status =
             bst_od_fit(&quiet, items, count, &options, &candidates[i].state, NULL, &solution);
@@ -152,6 +158,7 @@ static bst_status extend_to_arc(bst_ctx *ctx, const arc *a, part p, double span_
     double whole = time_of(o, count - 1) - time_of(o, 0);
     bst_od_options growing = *a->options;
     growing.scale_variance = false;
+    growing.least_gain = START_GAIN;
     while (span_s < whole) {
         int n = p.last - p.first + 1;
         span_s *= 2.0;
@@ -180,7 +187,8 @@ static bst_status solve_from(bst_ctx *ctx, const arc *a, part p, double span_s,
                              double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
     started starts[BST_OD_CANDIDATES];
     int found, used = select_evenly(a->items, p, FIRST_SAMPLES, a->room);
-    BST_TRY(fit_candidates(ctx, a->room, used, starts, &found, &report->candidates));
+    BST_TRY(fit_candidates(ctx, a->room, used, a->options->most_failures, starts, &found,
+                           &report->candidates));
     bst_status status = BST_OK;
     bool done = false;
     bst_ctx quiet = {0};
@@ -246,8 +254,11 @@ static bst_status solve_arc(bst_ctx *ctx, const arc *a, double *residual_chi2, b
             return status;
         }
         /* a longer part may determine what a shorter one does not */
-        span_s *= 2.0;
-        p = densest_part(o, count, span_s);
+        const part failed = p;
+        while (span_s < whole && p.first == failed.first && p.last == failed.last) {
+            span_s *= 2.0;
+            p = densest_part(o, count, span_s);
+        }
     }
 }
 

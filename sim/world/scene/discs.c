@@ -340,6 +340,35 @@ void bst_discs_daylight(const bst_discs *discs, bst_vec3 direction, bool *day, b
     }
 }
 
+/* Whether the terminator of the Earth, whose disc fills all directions up to radius_rad from an
+ * axis, is in none of them. */
+static bool no_terminator(const bst_scene_body_disc *d, bst_vec3 axis, double radius_rad) {
+    int lit = 0, dark = 0;
+    for (int k = 0; k <= BST_DISC_PARTS; k += BST_DISC_PARTS / 2) {
+        double height, from_centre = earth_edge(d, k, axis) + d->half_angle[k] + radius_rad;
+        if (d->distance[k] <= 1.0 || !(from_centre < d->half_angle[k])) {
+            return false;
+        }
+        /* what a ray that turns by an angle moves on the unit sphere: most at the largest depth,
+         * where the way to the sphere is longest and its incidence is lowest */
+        double depth = d->distance[k] * sin(from_centre), steep = sqrt(1.0 - depth * depth);
+        double way = sqrt(d->distance[k] * d->distance[k] - depth * depth) - steep;
+        double most = (1.0 + 2.0 * BST_EARTH_FLATTENING) * radius_rad * way / steep;
+        double day = bst_vec3_dot(normal_at(earth_place(d, k, axis, &height)), d->sun[k]);
+        lit += day > most;
+        dark += day < -most;
+    }
+    return lit == 3 || dark == 3;
+}
+
+bool bst_discs_none_begins(const bst_discs *discs, bst_vec3 axis, double radius_rad, double px) {
+    /* angles in the coordinates in which the Earth is a sphere */
+    const double radius = (1.0 + 2.0 * BST_EARTH_FLATTENING) * radius_rad;
+    const bst_scene_body_disc *earth = &discs->body[BST_BODY_EARTH];
+    return bst_discs_edge_px(discs, axis) > radius / discs->scale_rad + px &&
+           (!earth->present || no_terminator(earth, axis, radius));
+}
+
 /* Radiance of the Earth's disc, or of its limb glow, at the middle of a time interval. */
 static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, double share,
                              double *sunlight) {

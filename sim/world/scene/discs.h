@@ -79,6 +79,10 @@ void bst_discs_daylight(const bst_discs *discs, bst_vec3 direction, bool *day, b
  * of a disc during the exposure, minus the reach of the disc's light. */
 double bst_discs_edge_px(const bst_discs *discs, bst_vec3 direction);
 
+/* True only if no direction up to radius_rad from an axis (unit, camera axes) is within `px` of an
+ * edge by bst_discs_edge_px, and bst_discs_daylight is the same in all of them. */
+bool bst_discs_none_begins(const bst_discs *discs, bst_vec3 axis, double radius_rad, double px);
+
 /* Distance of a direction from the nearest blurred edge at the limits and middles of the time
  * intervals, px. Between them an edge moves uniformly: its light can be interpolated. */
 double bst_discs_sharp_edge_px(const bst_discs *discs, bst_vec3 direction);

@@ -77,13 +77,17 @@ bool bst_skylight_may_vary(const bst_camera *camera) {
     return bst_skylight_varies(camera) || bst_discs_wanted(camera);
 }
 
+/* Index of the cell that has a position, in steps from the first node; the first or last beyond. */
+static int cell_of(float u, int nodes) {
+    const int i = (int)floorf(u);
+    return i < 0 ? 0 : i > nodes - 2 ? nodes - 2 : i;
+}
+
 /* Bilinear interpolation between nodes. The step is a power of two: the weights are exact, and
  * overlapping maps agree to the bit. */
 static float interpolate(const lattice *l, float x, float y) {
     float u = (x - (float)l->x0) / (float)l->step, v = (y - (float)l->y0) / (float)l->step;
-    int i = (int)floorf(u), j = (int)floorf(v);
-    i = i < 0 ? 0 : i > l->columns - 2 ? l->columns - 2 : i;
-    j = j < 0 ? 0 : j > l->rows - 2 ? l->rows - 2 : j;
+    int i = cell_of(u, l->columns), j = cell_of(v, l->rows);
     float s = u - (float)i, t = v - (float)j;
     const float *a = l->value + (size_t)j * (size_t)l->columns + (size_t)i, *b = a + l->columns;
     float left = a[0] + t * (b[0] - a[0]), right = a[1] + t * (b[1] - a[1]);
@@ -262,6 +266,11 @@ static void next_cells(const painter *p, bst_skylight *b, int x0, int y) {
     fill_corners(p, x0, y, last);
 }
 
+/* Distance of a corner from an edge within which the edge may be in its cells, px. */
+static double edge_reach_px(const painter *p) {
+    return 1.06 * p->b->step / bst_camera_shrink(p->b->camera);
+}
+
 /* Checks whether cell i of the row may contain an edge: within half a cell's diagonal, with a
  * margin for larger pixels off axis; or the terminator. */
 static bool cell_has_edge(const painter *p, int i) {
@@ -273,7 +282,23 @@ static bool cell_has_edge(const painter *p, int i) {
         day = day || c->day;
         night = night || c->night;
     }
-    return (day && night) || near < 1.06 * p->b->step / bst_camera_shrink(p->b->camera);
+    return (day && night) || near < edge_reach_px(p);
+}
+
+/* Whether no edge of a disc can be on the sensor: a bound that needs one direction. */
+static bool is_far_from_edges(const painter *p) {
+    const bst_camera *camera = p->b->camera;
+    const int step = p->b->step;
+    const double x = (double)(((int)camera->width_px + step - 1) / step * step);
+    const double y = (double)(((int)camera->height_px + step - 1) / step * step);
+    const bst_vec3 middle = bst_camera_unproject(camera, 0.5 * x, 0.5 * y);
+    double radius = 0.0;
+    for (int k = 0; k < 4; k++) {
+        radius = fmax(radius, bst_vec3_angle(middle, bst_camera_unproject(camera, k & 1 ? x : 0.0,
+                                                                          k >> 1 ? y : 0.0)));
+    }
+    /* with a margin for distortion, which may bend a side outwards */
+    return bst_discs_none_begins(&p->discs, middle, 1.05 * radius, edge_reach_px(p));
 }
 
 /* Whether the edge of a body's disc or of the vignetting crosses the sensor. */
@@ -282,6 +307,9 @@ static bst_status find_edge(bst_ctx *ctx, const painter *p, bst_skylight *b, boo
     *found = false;
     if (b->step == 1 ||
         (!bst_discs_any(&p->discs) && !(camera->optics.vignetting.limit_px > 0.0))) {
+        return BST_OK;
+    }
+    if (!(camera->optics.vignetting.limit_px > 0.0) && is_far_from_edges(p)) {
         return BST_OK;
     }
     BST_TRY(begin_cells(ctx, p, b, 0, 0, (int)camera->width_px));
@@ -331,6 +359,24 @@ static double place_at(const bst_skylight *b, double x_px, double y_px) {
                : sum;
 }
 
+/* Background at a node. */
+static float paint_node(const bst_skylight *b, int k) {
+    const lattice *n = &b->nodes;
+    return paint(&b->painter, n->x0 + k % n->columns * n->step, n->y0 + k / n->columns * n->step,
+                 (double)b->sky.value[k]);
+}
+
+/* Paints the nodes around a position on the lattice that are not painted yet. */
+static void paint_around(bst_skylight *b, double x, double y) {
+    const lattice *n = &b->nodes;
+    const int i = cell_of(((float)x - (float)n->x0) / (float)n->step, n->columns);
+    const int j = cell_of(((float)y - (float)n->y0) / (float)n->step, n->rows);
+    for (int c = 0; c < 4; c++) {
+        const int k = (j + (c >> 1)) * n->columns + i + (c & 1);
+        n->value[k] = isnan(n->value[k]) ? paint_node(b, k) : n->value[k];
+    }
+}
+
 double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px) {
     if (map->at_pixels) {
         return place_at(map->at_pixels, x_px, y_px);
@@ -340,6 +386,9 @@ double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px) {
     if (map->columns < 2 || map->rows < 2) {
         size_t i = (size_t)(x - map->x0_px + 0.5), j = (size_t)(y - map->y0_px + 0.5);
         return (double)map->e[j * (size_t)map->columns + i];
+    }
+    if (map->at_nodes) {
+        paint_around(map->at_nodes, x, y);
     }
     const lattice l = {.step = map->step_px,
                        .x0 = map->x0_px,
@@ -522,17 +571,14 @@ bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surr
     const painter p = b->painter;
     BST_TRY(paint_sky(ctx, &p, b, window));
     BST_TRY(set_nodes(ctx, &b->nodes, b->step, window));
-    lattice *n = &b->nodes;
-    for (int j = 0; j < n->rows; j++) {
-        for (int i = 0; i < n->columns; i++) {
-            int k = j * n->columns + i;
-            n->value[k] =
-                paint(&p, n->x0 + i * n->step, n->y0 + j * n->step, (double)b->sky.value[k]);
-        }
-    }
-    bool edge;
+    bool edge, mapped = p.map_e > 0.0;
     BST_TRY(find_edge(ctx, &p, b, &edge));
-    bool mapped = p.map_e > 0.0;
+    lattice *n = &b->nodes;
+    /* ghosts need the least value of all nodes */
+    const bool by_need = b->places_only && !edge && !mapped && !b->camera->ghost_images;
+    for (int k = 0; k < n->columns * n->rows; k++) {
+        n->value[k] = by_need ? NAN : paint_node(b, k);
+    }
     if ((edge || mapped) && !b->places_only) {
         BST_TRY(edge ? paint_pixels(ctx, &p, b, window) : spread_nodes(ctx, b, window));
         n = &b->pixels;
@@ -542,12 +588,13 @@ bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surr
             add_stray_map(&p, n);
         }
     }
-    b->map = (bst_skylight_map){
-        n->step, n->x0,    n->y0,    n->columns,
-        n->rows, n->value, INFINITY, (edge || mapped) && b->places_only ? b : NULL};
-    for (int i = 0; i < n->columns * n->rows; i++) {
-        b->map.least_e = fmin(b->map.least_e, (double)n->value[i]);
+    double least = by_need ? 0.0 : INFINITY;
+    for (int i = 0; i < n->columns * n->rows && !by_need; i++) {
+        least = fmin(least, (double)n->value[i]);
     }
+    const bst_skylight *const at_pixels = (edge || mapped) && b->places_only ? b : NULL;
+    b->map = (bst_skylight_map){n->step,  n->x0, n->y0,     n->columns,        n->rows,
+                                n->value, least, at_pixels, by_need ? b : NULL};
     *out = &b->map;
     return BST_OK;
 }

@@ -20,6 +20,9 @@ typedef struct bst_skylight_map {
     /* not NULL: an edge is in the window (x0_px, y0_px, columns, rows in steps), `e` misses it, and
      * bst_skylight_at computes the pixels around a position itself */
     const struct bst_skylight *at_pixels;
+    /* not NULL: bst_skylight_at computes the nodes around a position when they are first asked for;
+     * `e` has NAN until then, and least_e is 0 */
+    struct bst_skylight *at_nodes;
 } bst_skylight_map;
 
 /* Background at a position of the full sensor; constant beyond the border of the map. */
@@ -47,8 +50,9 @@ void bst_skylight_free(bst_skylight *skylight); /* NULL allowed */
 /* Uses another camera with the same background and another scale from the next map on; borrowed. */
 void bst_skylight_set_camera(bst_skylight *skylight, const bst_camera *camera);
 
-/* From the next map on, pixels at an edge are computed by bst_skylight_at where they are asked for,
- * instead of all of them by bst_skylight_make: for those who need few places of a map. */
+/* From the next map on, pixels at an edge and, without ghosts, nodes elsewhere are computed by
+ * bst_skylight_at where they are asked for, instead of all of them by bst_skylight_make: for those
+ * who need few places of a map. */
 void bst_skylight_set_places_only(bst_skylight *skylight);
 
 /* Computes the background map of an exposure for a window. Nodes are 32 px apart, closer above 0.3
