@@ -156,9 +156,7 @@ static bst_status step(void *self, struct bst_step *s) {
     for (bst_sample next = bst_step_next(s, PORT_TRACKS); next.payload;
          next = bst_step_next(s, PORT_TRACKS)) {
         const bst_tracks *tracks = next.payload;
-        if (tracks->clock_sigma_s > 0.0) {
-            bst_knowledge_view_set_clock(m->view, tracks->clock_offset_s, tracks->clock_sigma_s);
-        }
+        bst_knowledge_view_set_clock(m->view, tracks->clock_offset_s, tracks->clock_sigma_s);
         BST_TRY(bst_control_observe(ctx, c, tick, tracks));
     }
     bool commanded;

@@ -330,8 +330,7 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
     g->path = (bst_star_trail_path){g->path_x, g->path_y, count};
     if (count >= 3 && !g->smeared) { /* `way` of smeared frames has the light of whole steps */
         int parts = bst_star_trail_parts(&g->path, 0.0, 0.0, g->total_sigma, GENERATOR_PLACES);
-        (void)bst_star_trail_divide(g->path_x, count, parts);
-        count = g->path.count = bst_star_trail_divide(g->path_y, count, parts);
+        count = g->path.count = bst_star_trail_divide(g->path_x, g->path_y, count, parts);
     }
     g->whole_path = (bst_obsgen_path_px){g->path_x[count - 1] - g->path_x[0],
                                          g->path_y[count - 1] - g->path_y[0]};

@@ -118,10 +118,11 @@ static double spread(const bst_clock *c, const double h[N], double ph[N]) {
     return variance;
 }
 
-/* Updates by one component with an error of its own. */
-static void update(bst_clock *c, const double h[N], double innovation, double variance) {
-    double ph[N];
-    double s = spread(c, h, ph) + variance;
+/* Updates by one component with an error of its own.
+ *
+ * Given:     ph  P times its derivatives
+ *            s   variance of the innovation */
+static void update(bst_clock *c, const double ph[N], double s, double innovation) {
     for (int i = 0; i < N; i++) {
         c->state[i] += ph[i] / s * innovation;
         for (int k = 0; k <= i; k++) {
@@ -193,8 +194,9 @@ bool bst_clock_measure(bst_clock *c, const bst_clock_params *p, const bst_clock_
         h[1][i] -= share * h[0][i];
     }
     double rest = bst_vec3_dot(at.e2, off) - share * bst_vec3_dot(at.e1, off);
-    update(c, h[0], nu[0], r[0]);
-    update(c, h[1], rest - product(h[1], c->state) + h[1][0] * s->corrected_s, det_r / r[0]);
+    update(c, ph[0], s11, nu[0]);
+    s22 = spread(c, h[1], ph[1]) + det_r / r[0];
+    update(c, ph[1], s22, rest - product(h[1], c->state) + h[1][0] * s->corrected_s);
     c->seen_s[(slot - OBJECTS) / 3] = c->time_s;
     c->measurements++;
     return true;

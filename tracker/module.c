@@ -310,8 +310,7 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
     bst_predictions *predictions = bst_step_write(step, PORT_PREDICTIONS, &prediction_room);
     bst_tracker_outcome outcome =
         bst_tracker_step(m->tracker, &input, tracks, track_room, predictions, prediction_room);
-    if (tracks->clock_sigma_s > 0.0 &&
-        bst_knowledge_view_set_clock(m->view, tracks->clock_offset_s, tracks->clock_sigma_s)) {
+    if (bst_knowledge_view_set_clock(m->view, tracks->clock_offset_s, tracks->clock_sigma_s)) {
         bst_tracker_cue_corrected(m->tracker);
     }
     assert(bst_tracks_are_valid(tracks, track_room));

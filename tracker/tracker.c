@@ -369,14 +369,13 @@ static void write_tracks(const bst_tracker *t, const bst_detections *d, const bs
                          int capacity) {
     int count;
     const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &count);
-    *out = (bst_tracks){
-        .exposure_id = d->exposure_id,
-        .tick = fix->tick,
-        .attitude = *fix,
-        .target_id = t->target.id,
-        .clock_offset_s = t->clock ? t->clock->state[0] : 0.0,
-        .clock_sigma_s = t->clock ? bst_clock_sigma_s(t->clock, &t->clock_params) : 0.0,
-        .lost = bst_mtt_lost(t->mtt) + detections_lost};
+    *out = (bst_tracks){.exposure_id = d->exposure_id,
+                        .tick = fix->tick,
+                        .attitude = *fix,
+                        .target_id = t->target.id,
+                        .clock_offset_s = bst_tracker_clock_s(t),
+                        .clock_sigma_s = bst_tracker_clock_sigma_s(t, bst_tracker_clock_s(t)),
+                        .lost = bst_mtt_lost(t->mtt) + detections_lost};
     for (int i = 0; i < count; i++) {
         out->at_rest += all[i].at_rest;
     }

@@ -145,6 +145,10 @@ bst_status bst_tracker_clock_create(bst_ctx *ctx, const bst_tracker_config *conf
  *
  * Errors:    BST_ERR_FORMAT */
 bst_status bst_tracker_clock_archive(bst_tracker *t, bst_archive *archive) BST_MUST_CHECK;
+/* Estimated offset of the onboard clock, s; 0 without an estimate. */
+static inline double bst_tracker_clock_s(const bst_tracker *t) {
+    return t->clock ? t->clock->state[0] : 0.0;
+}
 /* Updates the clock's offset by the detections of tracks of known objects. */
 void bst_tracker_learn_clock(bst_tracker *t, const bst_tracker_input *input,
                              const bst_mtt_frame *frame);

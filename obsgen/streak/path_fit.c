@@ -49,15 +49,22 @@ static void turn(samples *s, double cosine, double sine) {
     }
 }
 
+/* Least and greatest coordinates of places. */
+static void find_box(const double *x, const double *y, int count, double low[2], double high[2]) {
+    low[0] = low[1] = INFINITY;
+    high[0] = high[1] = -INFINITY;
+    for (int k = 0; k < count; k++) {
+        low[0] = fmin(low[0], x[k]);
+        high[0] = fmax(high[0], x[k]);
+        low[1] = fmin(low[1], y[k]);
+        high[1] = fmax(high[1], y[k]);
+    }
+}
+
 /* Distance over which a path goes on the whole: jitter is not counted. */
 static double extent_of(const bst_star_trail_path *p) {
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    for (int k = 0; k < p->count; k++) {
-        low[0] = fmin(low[0], p->x_px[k]);
-        high[0] = fmax(high[0], p->x_px[k]);
-        low[1] = fmin(low[1], p->y_px[k]);
-        high[1] = fmax(high[1], p->y_px[k]);
-    }
+    double low[2], high[2];
+    find_box(p->x_px, p->y_px, p->count, low, high);
     return hypot(high[0] - low[0], high[1] - low[1]);
 }
 
@@ -107,13 +114,8 @@ typedef struct grid {
 
 /* Covers the model with a margin; image processing fits no other pixels. */
 static grid grid_about(const samples *model, double sigma, double margin) {
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    for (int i = 0; i < model->count; i++) {
-        low[0] = fmin(low[0], model->x[i]);
-        high[0] = fmax(high[0], model->x[i]);
-        low[1] = fmin(low[1], model->y[i]);
-        high[1] = fmax(high[1], model->y[i]);
-    }
+    double low[2], high[2];
+    find_box(model->x, model->y, model->count, low, high);
     double wide = high[0] - low[0], tall = high[1] - low[1];
     double step = fmax(STEP_SIGMAS * sigma, fmax((wide + 2.0 * margin) / (COLUMNS - 1),
                                                  (tall + 2.0 * margin) / (ROWS - 1)));

@@ -60,11 +60,16 @@ static double point_lead(const bst_generator *g, const bst_star_trail_path *path
     return sqrt(streak.all / plain) * (own - other);
 }
 
+/* SNR of a source whose filter finds all of its light. */
+static double full_snr(const bst_generator *g, const generator_source *s) {
+    return s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
+}
+
 /* True if image processing sees a noisy source as a point: the shape of the greater output, or of
  * the better fit where it fits both. */
 static bool is_point(const bst_generator *g, const generator_source *s, const bst_path_outputs *o,
                      double lead) {
-    double snr = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
+    double snr = full_snr(g, s);
     double noise = bst_generator_filter_noise(g, s, 0), other = bst_generator_filter_noise(g, s, 1);
     double point = snr * o->point + noise, streak = snr * o->streak + other;
     if (point > streak) {
@@ -151,9 +156,8 @@ bst_star_trail_path bst_generator_object_path(const bst_generator *g, const gene
         g->object_x[k] = g->path_x[k] + u * dx;
         g->object_y[k] = g->path_y[k] + u * dy;
     }
-    (void)bst_star_trail_divide(g->object_x, count, parts);
-    return (bst_star_trail_path){g->object_x, g->object_y,
-                                 bst_star_trail_divide(g->object_y, count, parts)};
+    count = bst_star_trail_divide(g->object_x, g->object_y, count, parts);
+    return (bst_star_trail_path){g->object_x, g->object_y, count};
 }
 
 /* Fits an object's elongated point again as a streak of its own (imgproc/measure/source_moments.h),
@@ -196,9 +200,8 @@ static void set_uneven_object(const bst_generator *g, generator_source *s, doubl
         !is_point(g, s, &o, point_lead(g, &path, light, streak, plain, at, &s->point_flux));
     efficiency[0] = fmin(o.point, 1.0);
     efficiency[1] = fmin(o.streak, 1.0);
-    double snr = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
     if (!s->as_streak && s->length > LEAST_OWN_SIGMAS * g->total_sigma &&
-        snr * o.point > GENERATOR_MOMENTS_SNR) {
+        full_snr(g, s) * o.point > GENERATOR_MOMENTS_SNR) {
         fit_own_streak(g, &path, light, s);
     }
 }

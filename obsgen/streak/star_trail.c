@@ -178,14 +178,19 @@ int bst_star_trail_parts(const bst_star_trail_path *p, double more_x_px, double 
     return parts > 1.0 ? (int)parts : 1;
 }
 
-int bst_star_trail_divide(double *places, int count, int parts) {
-    assert(places && count >= 2 && parts >= 1);
+static void divide(double *places, int count, int parts) {
     for (int k = count - 1; k > 0; k--) { /* from the end: places move to higher indices */
         double from = places[k - 1], to = places[k];
         for (int i = 1; i <= parts; i++) {
             places[(k - 1) * parts + i] = from + (to - from) * i / parts;
         }
     }
+}
+
+int bst_star_trail_divide(double *x_px, double *y_px, int count, int parts) {
+    assert(x_px && y_px && count >= 2 && parts >= 1);
+    divide(x_px, count, parts);
+    divide(y_px, count, parts);
     return (count - 1) * parts + 1;
 }
 

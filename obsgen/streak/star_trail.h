@@ -29,9 +29,9 @@ typedef struct bst_star_trail_path {
 int bst_star_trail_parts(const bst_star_trail_path *path, double more_x_px, double more_y_px,
                          double step_px, int most);
 
-/* Divides each step of a path, along one axis, into equal parts. `places` has room for the new
- * number of places, (count - 1) parts + 1, which is returned. */
-int bst_star_trail_divide(double *places, int count, int parts);
+/* Divides each step of a path into equal parts. x_px and y_px have room for the new number of
+ * places, (count - 1) parts + 1, which is returned. */
+int bst_star_trail_divide(double *x_px, double *y_px, int count, int parts);
 
 /* Lays out the nodes of a trail; returns their number. A path that returns to a position has one
  * node there.

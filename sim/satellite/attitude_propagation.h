@@ -31,15 +31,19 @@ typedef struct bst_attitude_propagation bst_attitude_propagation;
  *
  * Given:     start          its moments as bst_tumbling_check allows
  *            tolerance_rad  estimated error of the attitude after a day: each step may add its
- * share by time, of the attitude and of the rate times a day torque         called under the
- * propagation's mutex Returned:  *out  NULL on error Errors:    BST_ERR_MEMORY Ownership: free *out
- * with bst_attitude_propagation_free Notes:     A step is the motion without torque
- * (bst_tumbling_turn), with impulses of the torque at its start, middle and end, weighted as by
- * Simpson: without torque, energy and momentum are kept at any length of the step. It is taken at
- * once and in two halves. The difference gives the error and, by Richardson's extrapolation, the
- * result. Steps are at most 120 s, and a radian of rotation. Between them the deviation from the
- * motion without torque is a cubic polynomial. Reference: McLachlan, BIT 35 (1995) 258; Laskar and
- * Robutel, Celest. Mech. Dyn. Astron. 80 (2001) 39 (SBAB2: composition for small perturbations) */
+ *                           share by time, of the attitude and of the rate times a day
+ *            torque         called under the propagation's mutex
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_attitude_propagation_free
+ * Notes:     A step is the motion without torque (bst_tumbling_turn), with impulses of the torque
+ *            at its start, middle and end, weighted as by Simpson: without torque, energy and
+ *            momentum are kept at any length of the step. It is taken at once and in two halves.
+ *            The difference gives the error and, by Richardson's extrapolation, the result. Steps
+ *            are at most 120 s, and a radian of rotation. Between them the deviation from the
+ *            motion without torque is a cubic polynomial.
+ * Reference: McLachlan, BIT 35 (1995) 258; Laskar and Robutel, Celest. Mech. Dyn. Astron. 80
+ *            (2001) 39 (SBAB2: composition for small perturbations) */
 bst_status bst_attitude_propagation_create(bst_ctx *ctx, const bst_attitude_motion *start,
                                            double tolerance_rad, bst_attitude_torque_fn torque,
                                            void *user,

@@ -16,14 +16,18 @@ struct bst_object_torque {
     double density_scale;
 };
 
+static void free_orbit(bst_world_orbit *own) {
+    if (own) {
+        bst_world_orbit_free(own);
+        free(own);
+    }
+}
+
 bst_status bst_object_torque_create(const bst_world_builder *b,
                                     const bst_object_torque_setup *setup, bst_object_torque **out) {
     bst_object_torque *t = *out = calloc(1, sizeof *t);
     if (!t) {
-        if (setup->own) {
-            bst_world_orbit_free(setup->own);
-            free(setup->own);
-        }
+        free_orbit(setup->own);
         return bst_fail(b->ctx, BST_ERR_MEMORY, "no memory for the torques on an object");
     }
     pthread_mutex_init(&t->lock, NULL);
@@ -51,10 +55,7 @@ void bst_object_torque_free(bst_object_torque *t) {
         pthread_mutex_destroy(&t->lock);
         bst_surface_torque_free(t->surface);
         bst_sky_clock_free(t->clock);
-        if (t->own) {
-            bst_world_orbit_free(t->own);
-            free(t->own);
-        }
+        free_orbit(t->own);
         free(t);
     }
 }

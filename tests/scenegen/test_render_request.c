@@ -50,7 +50,8 @@ static void maps_cover_their_windows(void **state) {
     bst_camera camera = camera_of(12, 9);
     camera.background.stray_e_per_s = 1.0;
     static const float e[3 * 4];
-    const bst_skylight_map map = {2, 2, 1, 4, 3, e, 0.0, NULL, NULL};
+    const bst_skylight_map map = {
+        .step_px = 2, .x0_px = 2, .y0_px = 1, .columns = 4, .rows = 3, .e = e};
     const bst_los_track track = {.count = 2, .time_s = times, .q_cam_from_gcrf = attitudes};
     int good = 0;
     for (int x0 = 0; x0 < 12; x0++) {
@@ -77,7 +78,8 @@ static void kernels_get_the_window(void **state) {
     const bst_camera camera = camera_of(700, 500);
     const bst_los_track track = {.count = 2, .time_s = times, .q_cam_from_gcrf = attitudes};
     static const float e[5 * 7];
-    const bst_skylight_map map = {16, 144, 96, 7, 5, e, 0.0, NULL, NULL};
+    const bst_skylight_map map = {
+        .step_px = 16, .x0_px = 144, .y0_px = 96, .columns = 7, .rows = 5, .e = e};
     const bst_render_request q = {.window = {150, 101, 106, 64},
                                   .track = &track,
                                   .background_e = 12.0,

@@ -74,8 +74,7 @@ bst_mtt_sight bst_tracker_frame_sight_of(const void *user, const bst_mtt_track *
 
 bool bst_tracker_frame_observer(const bst_tracker *t, const bst_nav_telemetry *nav, double seconds,
                                 bst_od_observer *out) {
-    double clock_s = t->clock ? t->clock->state[0] : 0.0;
-    double dt = seconds - clock_s - (double)nav->tick / t->tick_rate_hz;
+    double dt = seconds - bst_tracker_clock_s(t) - (double)nav->tick / t->tick_rate_hz;
     out->time_s = seconds;
     out->earth_bary_mps = bst_vec3_sub(nav->velocity_bary_mps, nav->velocity_gcrf_mps);
     bst_nav_state_after(nav, dt, &out->position_m, &out->velocity_mps);
