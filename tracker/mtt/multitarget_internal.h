@@ -112,6 +112,9 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
 /* Associates the frame's detections with the predicted tracks: sets detection_of_track, shared and
  * extra. */
 void bst_mtt_associate(bst_mtt *mtt, bool partial);
+/* Takes the detections of a track that has just been confirmed out of the mean number of those
+ * without a confirmed track. */
+void bst_mtt_recount_alarms(bst_mtt *mtt, const bst_mtt_track *track);
 
 /* Brightness term of the association cost (-ln likelihood), at most 4.5. */
 double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection);
