@@ -17,6 +17,7 @@ void bst_mtt_recount_alarms(bst_mtt *mtt, const bst_mtt_track *track) {
     assert(mtt && track && track->hits >= 0);
     /* hits of a few frames ago have nearly the weight of the latest frame */
     mtt->alarms = fmax(mtt->alarms - alarm_gain(mtt) * track->hits, 0.0);
+    bst_mtt_note_alarm(mtt, track->snr, -track->hits);
 }
 
 /* Largest 1 sigma of a direction measurement in the frame, rad. */
@@ -109,9 +110,16 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
     }
     bst_mtt_gate_manoeuvres(mtt);
     int unused = 0, unexplained = 0; /* without a confirmed track, without any track */
+    if (!partial) {
+        bst_mtt_fade_alarms(mtt);
+    }
     for (int i = 0; i < mtt->now.count; i++) {
+        bool alarm = jointly ? mtt->joint.claimed_firm[i] <= 0.5 : !mtt->now.used[i];
         unexplained += !mtt->now.used[i];
-        unused += jointly ? mtt->joint.claimed_firm[i] <= 0.5 : !mtt->now.used[i];
+        unused += alarm;
+        if (alarm && !partial) {
+            bst_mtt_note_alarm(mtt, mtt->now.items[i].snr, 1.0);
+        }
     }
     if (!partial) {
         mtt->alarm_frames++;
