@@ -275,6 +275,25 @@ static void false_alarms_are_counted(void **state) {
     bst_mtt_free(b->mtt);
 }
 
+/* A track that is confirmed takes its hits out of the mean: three of the first five frames. */
+static void confirmed_tracks_were_no_alarms(void **state) {
+    (void)state;
+    const bst_mtt_params params = defaults();
+    bench *b = start(6, &params);
+    const bst_mtt_track track = {.hits = 3, .snr = 20.0};
+    b->mtt->alarms = 4.0;
+    b->mtt->alarm_frames = 5;
+    bst_mtt_recount_alarms(b->mtt, &track);
+    bst_assert_close(b->mtt->alarms, 4.0 - 3.0 / 5.0, 1e-12);
+    b->mtt->alarm_frames = 50;
+    bst_mtt_recount_alarms(b->mtt, &track);
+    bst_assert_close(b->mtt->alarms, 3.4 - 0.3, 1e-12);
+    b->mtt->alarms = 0.1;
+    bst_mtt_recount_alarms(b->mtt, &track);
+    assert_true(b->mtt->alarms == 0.0);
+    bst_mtt_free(b->mtt);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(gates_have_two_axes),
@@ -284,6 +303,7 @@ int main(void) {
         cmocka_unit_test(confirmed_tracks_choose_first),
         cmocka_unit_test(ranges_hold_what_is_near),
         cmocka_unit_test(false_alarms_are_counted),
+        cmocka_unit_test(confirmed_tracks_were_no_alarms),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

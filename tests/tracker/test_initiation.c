@@ -1,7 +1,9 @@
 /* New tracks beside a cue whose motion bends. */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "tests/tracker/pixel_tracker.h"
+#include "tracker/mtt/multitarget_internal.h"
 
 enum { FRAMES = 12 };
 
@@ -223,10 +225,102 @@ static void pairs_across_a_missed_detection(void **state) {
     }
 }
 
+/* Twenty false detections a frame for 60 frames, of an SNR from 5 to 6; then an object of `snr`, of
+ * which the second frame has no detection. Frame in which it is confirmed, counted from its first;
+ * `most`: not in these. */
+static int confirmed_after(double snr, int most) {
+    bst_ctx ctx = {0};
+    bst_mtt *mtt;
+    bst_mtt_params params = pixel_tracker(256, 32);
+    params.association = BST_MTT_PMB;
+    bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
+    bst_rng_key key = bst_rng_make_key(1, 0, "initiation", "alarms");
+    const bst_vec3 centre = {1, 0, 0};
+    bst_tangent axes = bst_tangent_at(centre);
+    uint64_t draw = 0;
+    int frames = 0, n = 0;
+    for (int k = 0; k < 60 + most && n == 0; k++) {
+        bst_mtt_detection seen[21];
+        int count = 0;
+        for (int i = 0; i < 20; i++) {
+            double x = FIELD_PX * (bst_rng_uniform(key, 0, draw) - 0.5);
+            double y = FIELD_PX * (bst_rng_uniform(key, 0, draw + 1) - 0.5);
+            bst_vec3 off = bst_tangent_vector(&axes, x * PX, y * PX);
+            seen[count++] = (bst_mtt_detection){.sky.direction = bst_tangent_exp(centre, off),
+                                                .snr = 5.0 + bst_rng_uniform(key, 0, draw + 2)};
+            draw += 3;
+        }
+        if (k >= 60 && k != 61) {
+            bst_vec3 rate;
+            seen[count++] = (bst_mtt_detection){
+                .sky.direction = place(0.0, 20.0 * AS, k - 60, &rate), .snr = snr};
+        }
+        for (int i = 0; i < count; i++) {
+            seen[i].sky.cov_11 = seen[i].sky.cov_22 = pow(0.1 * PX, 2);
+            seen[i].v_mag = 15.0 - 2.5 * log10(seen[i].snr / 10.0);
+            seen[i].v_mag_sigma = 1.0857 / seen[i].snr;
+            seen[i].length_rad = 2 * PX;
+        }
+        bst_mtt_frame f = {.tick = 1000 * k,
+                           .seconds = k,
+                           .detections = seen,
+                           .count = count,
+                           .threshold_snr = 5.0};
+        bst_mtt_step(mtt, &f);
+        int tracks;
+        const bst_mtt_track *track = bst_mtt_tracks(mtt, &tracks);
+        for (int i = 0; i < tracks; i++) {
+            n += track[i].status == BST_TRACK_CONFIRMED;
+        }
+        frames = k - 60;
+    }
+    bst_mtt_free(mtt);
+    return n > 0 ? frames : most;
+}
+
+/* Where false detections are faint, three of SNR 20 are enough, and four of SNR 5.5 are needed. */
+static void bright_objects_are_confirmed_sooner(void **state) {
+    (void)state;
+    assert_int_equal(confirmed_after(20.0, 10), 3);
+    assert_int_equal(confirmed_after(5.5, 10), 4);
+}
+
+/* The likelihood ratio of a pair of detections by its SNR: figures from the formulas of the
+ * documentation (equations of tracking), computed apart from the program. */
+static void brightness_of_pairs(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_mtt *m;
+    bst_mtt_params params = pixel_tracker(16, 16);
+    bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &m));
+    assert_true(bst_mtt_pair_brightness(m, 20.0, 20.0) == 0.0); /* threshold unknown */
+    m->threshold_snr = 5.0;
+    assert_true(bst_mtt_pair_brightness(m, NAN, 20.0) == 0.0);
+    bst_assert_close(bst_mtt_pair_brightness(m, 20.0, 20.0), log(0.9 / 0.5), 1e-9);
+    for (int i = 0; i < 190; i++) {
+        bst_mtt_note_alarm(m, 5.5, 1.0);
+    }
+    /* shares of false alarms: (190 + 10/6)/200 of SNR 5 to 6, 0.025 above 10 */
+    bst_assert_close(bst_mtt_pair_brightness(m, 20.0, 10.5), log(0.5 / 0.025 * 0.9 / 0.025), 1e-9);
+    /* 1/10/200 of SNR 10 and 5/42 of 6 to 7: the second one after 1 + e^-0.25 + ... */
+    double sum = 1.0 + 2.0 * exp(-0.25) + exp(-1.0) + exp(-2.25) + exp(-4.0);
+    double p6 = 5.0 / 42.0, p7 = 5.0 / 56.0;
+    double second = exp(-0.25) / sum / (p7 / 20.0);
+    bst_assert_close(bst_mtt_pair_brightness(m, 6.5, 7.5), log(p6 / (p6 / 20.0) * second), 1e-9);
+    assert_true(bst_mtt_pair_brightness(m, 5.5, 5.5) == 0.0); /* never against an object */
+    bst_mtt_fade_alarms(m);
+    bst_assert_close(m->alarm_snr[0], 190.0 * 199.0 / 200.0, 1e-9);
+    bst_mtt_note_alarm(m, 5.5, -500.0);
+    assert_true(m->alarm_snr[0] == 0.0);
+    bst_mtt_free(m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(births_from_blended_detections),
                                        cmocka_unit_test(pairs_have_the_cues_acceleration),
                                        cmocka_unit_test(many_alarms_ask_for_more),
-                                       cmocka_unit_test(pairs_across_a_missed_detection)};
+                                       cmocka_unit_test(pairs_across_a_missed_detection),
+                                       cmocka_unit_test(bright_objects_are_confirmed_sooner),
+                                       cmocka_unit_test(brightness_of_pairs)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

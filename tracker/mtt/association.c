@@ -8,6 +8,18 @@
 /* Gain of the smoothed number of false alarms per frame, after the first frames. */
 #define ALARM_GAIN 0.1
 
+/* Weight of the latest frame in the mean number of false alarms. */
+static double alarm_gain(const bst_mtt *mtt) {
+    return fmax(ALARM_GAIN, 1.0 / mtt->alarm_frames);
+}
+
+void bst_mtt_recount_alarms(bst_mtt *mtt, const bst_mtt_track *track) {
+    assert(mtt && track && track->hits >= 0);
+    /* hits of a few frames ago have nearly the weight of the latest frame */
+    mtt->alarms = fmax(mtt->alarms - alarm_gain(mtt) * track->hits, 0.0);
+    bst_mtt_note_alarm(mtt, track->snr, -track->hits);
+}
+
 /* Largest 1 sigma of a direction measurement in the frame, rad. */
 static double largest_sigma(const bst_mtt_pool *pool) {
     double variance = 0.0;
@@ -97,15 +109,23 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
         bst_mtt_share(mtt);
     }
     bst_mtt_gate_manoeuvres(mtt);
-    int unused = 0;
+    int unused = 0, unexplained = 0; /* without a confirmed track, without any track */
+    if (!partial) {
+        bst_mtt_fade_alarms(mtt);
+    }
     for (int i = 0; i < mtt->now.count; i++) {
-        unused += jointly ? mtt->joint.claimed_firm[i] <= 0.5 : !mtt->now.used[i];
+        bool alarm = jointly ? mtt->joint.claimed_firm[i] <= 0.5 : !mtt->now.used[i];
+        unexplained += !mtt->now.used[i];
+        unused += alarm;
+        if (alarm && !partial) {
+            bst_mtt_note_alarm(mtt, mtt->now.items[i].snr, 1.0);
+        }
     }
     if (!partial) {
         mtt->alarm_frames++;
-        mtt->alarms += fmax(ALARM_GAIN, 1.0 / mtt->alarm_frames) * (unused - mtt->alarms);
+        mtt->alarms += alarm_gain(mtt) * (unused - mtt->alarms);
         mtt->clutter_density =
-            fmax(fmax(mtt->clutter, unused), mtt->params.false_alarms_per_frame) /
+            fmax(fmax(mtt->clutter, unexplained), mtt->params.false_alarms_per_frame) /
             mtt->params.field_sr;
     }
     if (!jointly) {

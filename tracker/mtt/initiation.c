@@ -119,6 +119,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     double sigma_mag = own == 0.0 ? later->v_mag_sigma : earlier->v_mag_sigma;
     /* of the mean of two, or of one alone */
     double variance = (own == 0.5 ? 0.5 : 1.0) * (floor * floor + sigma_mag * sigma_mag);
+    double brightness = bst_mtt_pair_brightness(mtt, earlier->snr, later->snr);
     assert(dt > 0.0 &&
            mtt->track_count < mtt->params.max_tracks + mtt->params.max_stationary_tracks);
     bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
@@ -134,7 +135,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .frames = 2,
         .score = fmax(0.0, log(mtt->params.detection_probability /
                                (mtt->clutter_density * BST_PI * reach * reach))) -
-                 log(fmax(1.0, alarms / FEW_ALARMS)),
+                 log(fmax(1.0, alarms / FEW_ALARMS)) + brightness,
         .last_chi2 = -1.0,
         .first_tick = pool->tick,
         .last_update_tick = mtt->now.tick,
@@ -148,7 +149,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     double pd = mtt->params.detection_probability;
     double odds = pool->undetected * pd / fmax(1.0, alarms) *
                   pow(1.0 - pd, (double)(pool - mtt->history)) * pd /
-                  (mtt->clutter_density * BST_PI * reach * reach);
+                  (mtt->clutter_density * BST_PI * reach * reach) * exp(brightness);
     track->existence = odds / (1.0 + odds);
     bst_mtt_start_snr(track);
     bst_mtt_note_snr(mtt, earlier->snr, track);

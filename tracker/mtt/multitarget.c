@@ -426,6 +426,7 @@ static void maintain_tracks(bst_mtt *m, const bst_mtt_frame *frame) {
             }
         } else if (taken && may_confirm(m, track)) {
             track->status = BST_TRACK_CONFIRMED;
+            bst_mtt_recount_alarms(m, track);
             bool resumed = bst_mtt_resume(m, track, true);
             record_event(m, resumed ? BST_MTT_RESUMED : BST_MTT_CONFIRMED, track, 0.0);
         }

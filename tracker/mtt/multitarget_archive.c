@@ -44,6 +44,7 @@ bst_status bst_mtt_archive(bst_mtt *m, bst_archive *archive) {
     BST_ARCHIVE(archive, m->alarms);
     BST_ARCHIVE(archive, m->alarm_frames);
     BST_ARCHIVE(archive, m->alarm_density);
+    BST_ARCHIVE(archive, m->alarm_snr);
     BST_ARCHIVE(archive, m->lost);
     bst_mtt_pool_archive(&m->now, m->params.max_detections, archive);
     m->history_count = bst_archive_count(archive, m->history_count, BST_MTT_HISTORY);

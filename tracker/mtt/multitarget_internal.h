@@ -13,6 +13,9 @@
 /* Candidate detections per track: the likeliest. */
 #define BST_MTT_CANDIDATES BST_FILTER_CANDIDATES
 
+/* Intervals of the SNR of false alarms. */
+enum { BST_MTT_SNR_INTERVALS = 6 };
+
 /* Values of `owner` for detections without a single confirmed track. */
 #define BST_MTT_NOBODY (-1)
 #define BST_MTT_SEVERAL (-2)
@@ -67,6 +70,7 @@ struct bst_mtt {
     double alarms;
     int alarm_frames;
     double alarm_density;
+    double alarm_snr[BST_MTT_SNR_INTERVALS]; /* number of those of the latest frames by SNR */
     int lost;
     bst_mtt_event *events;
     int event_count;
@@ -112,6 +116,9 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
 /* Associates the frame's detections with the predicted tracks: sets detection_of_track, shared and
  * extra. */
 void bst_mtt_associate(bst_mtt *mtt, bool partial);
+/* Takes the detections of a track that has just been confirmed out of the mean number of those
+ * without a confirmed track. */
+void bst_mtt_recount_alarms(bst_mtt *mtt, const bst_mtt_track *track);
 
 /* Brightness term of the association cost (-ln likelihood), at most 4.5. */
 double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection);
@@ -137,6 +144,13 @@ static inline double bst_mtt_detectable(const bst_mtt *mtt, const bst_mtt_track 
     bool counts = track->may_miss || track->star;
     return counts ? bst_mtt_detection_probability(mtt, track) * (1.0 - track->dark) : 0.0;
 }
+/* ln of the likelihood ratio of the SNR of a pair of detections: of one object, or false alarms;
+ * not below 0. */
+double bst_mtt_pair_brightness(const bst_mtt *mtt, double first_snr, double second_snr);
+/* Reduces the number of false alarms seen so far before a frame's are added. */
+void bst_mtt_fade_alarms(bst_mtt *mtt);
+/* Adds false alarms of an SNR; count < 0: takes out detections that were none. */
+void bst_mtt_note_alarm(bst_mtt *mtt, double snr, double count);
 /* Starts the distribution of a track's SNR: all levels are equally probable. */
 void bst_mtt_start_snr(bst_mtt_track *track);
 /* Updates it by a detection with the light of the track's object alone. */
