@@ -304,6 +304,45 @@ static void track_metrics_by_hand(void **state) {
     bst_track_metrics_free(m);
 }
 
+/* Tracks of four objects, near them (N) or not (F): a ghost is alone for more than three frames in
+ * a row, a false track in more than half of its frames. */
+static void limits_of_ghosts_and_false_tracks(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    static const struct {
+        const char *frames;
+        int ghost, wrong;
+    } track[4] = {{"NFFFNNNN", 0, 0}, {"NFFFFNNN", 1, 0}, {"FFFNFFFN", 0, 1}, {"NNFFNFFF", 0, 1}};
+    const int64_t numbers[4] = {0, 1, 2, 3};
+    for (int k = 0; k < 4; k++) { /* each alone, and all together */
+        for (int all = 0; all < 2; all++) {
+            bst_track_metrics *m;
+            bst_track_figures f;
+            int first = all ? 0 : k, end = all ? 4 : k + 1, ghosts = 0, wrong = 0;
+            bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, 4, 1e-4, &m));
+            for (int n = 0; n < 8; n++) {
+                bst_vec3 truth[4], at[4];
+                for (int i = first; i < end; i++) {
+                    truth[i] = bst_vec3_from_radec(0.1 * i, 0.0);
+                    at[i] = bst_vec3_from_radec(0.1 * i, track[i].frames[n] == 'N' ? 0.0 : 0.1);
+                }
+                const bst_track_frame frame = {10.0 * n,    numbers + first, truth + first,
+                                               end - first, numbers + first, at + first,
+                                               end - first};
+                bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, m, &frame));
+            }
+            for (int i = first; i < end; i++) {
+                ghosts += track[i].ghost;
+                wrong += track[i].wrong;
+            }
+            bst_track_metrics_figures(m, &f);
+            assert_int_equal(f.ghosts, ghosts);
+            assert_int_equal(f.false_tracks, wrong);
+            bst_track_metrics_free(m);
+        }
+    }
+}
+
 /* Two correlated measurements of a place that moves evenly but for noise of acceleration: the
  * second is the place, their difference over dt the rate, whose variance has q dt^3 / 3 of the
  * first one's way back in it. */
@@ -511,6 +550,7 @@ int main(void) {
                                        cmocka_unit_test(information_left_in_clutter),
                                        cmocka_unit_test(gospa_by_hand),
                                        cmocka_unit_test(gospa_is_the_least_and_a_metric),
-                                       cmocka_unit_test(track_metrics_by_hand)};
+                                       cmocka_unit_test(track_metrics_by_hand),
+                                       cmocka_unit_test(limits_of_ghosts_and_false_tracks)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

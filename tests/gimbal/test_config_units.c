@@ -57,6 +57,41 @@ static void a_chain_of_three_axes(void **state) {
     }
 }
 
+/* The energy of a stage that turns does not depend on the axes in which its tensor is written: body
+ * axes of the configuration, or those of the mount. */
+static void stages_have_the_inertia_that_is_stated(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    /* xx, yy, zz, xy, xz, yz */
+    const double stage[3][6] = {{0.6, 0.5, 0.45, 0.02, -0.03, 0.011},
+                                {0.5, 0.4, 0.33, -0.015, 0.04, 0.025},
+                                {0.2, 0.16, 0.15, 0.004, 0.007, -0.013}};
+    const bst_vec3 rates[] = {{1, 0, 0},     {0, 1, 0},      {0, 0, 1},       {1, 1, 0},
+                              {0.3, 0, 0.8}, {0, -0.7, 0.4}, {0.5, -0.3, 0.9}};
+    for (int type = BST_MOUNT_AZIMUTH_ELEVATION; type <= BST_MOUNT_CROSS_ELEVATION; type++) {
+        bst_mount_config c;
+        bst_mount m;
+        bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_mount_config_table, &c));
+        c.third_axis = true;
+        memcpy(c.inertia_outer_kgm2, stage[0], sizeof stage[0]);
+        memcpy(c.inertia_inner_kgm2, stage[1], sizeof stage[1]);
+        memcpy(c.inertia_third_kgm2, stage[2], sizeof stage[2]);
+        bst_assert_ok(&ctx, bst_mount_init(&ctx, &m, type, &c, 1e-3, (bst_rng_key){{1, 2}}));
+        for (int k = 0; k < 3; k++) {
+            for (int i = 0; i < 7; i++) {
+                double energy[2];
+                for (int own = 0; own < 2; own++) {
+                    const double *j = own ? m.joints.chain.inertia[k] : stage[k];
+                    bst_vec3 w = own ? bst_mount_swap(type, rates[i]) : rates[i];
+                    energy[own] = 0.5 * (j[0] * w.x * w.x + j[1] * w.y * w.y + j[2] * w.z * w.z) +
+                                  j[3] * w.x * w.y + j[4] * w.x * w.z + j[5] * w.y * w.z;
+                }
+                bst_assert_close(energy[1], energy[0], 1e-15);
+            }
+        }
+    }
+}
+
 static void a_second_order_mount(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -198,6 +233,7 @@ static void at_the_pole_the_outer_axis_stays(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_chain_of_three_axes),
+        cmocka_unit_test(stages_have_the_inertia_that_is_stated),
         cmocka_unit_test(a_second_order_mount),
         cmocka_unit_test(an_attitude_controller),
         cmocka_unit_test(a_star_tracker),

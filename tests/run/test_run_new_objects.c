@@ -126,9 +126,60 @@ static void new_objects_match_the_catalogue(void **state) {
                                         "= 3 AND chi2_mean IS NULL",
                                         0, 0),
                      1);
+    /* six directions of each track, of two angles each, and six elements */
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody_candidates WHERE candidate = "
+                                        "1 AND track_id = tracks AND true_object = 0 AND wrong = 0 "
+                                        "AND abs(time_s - 6900 * tracks + 6750) < 0.01 AND CASE "
+                                        "tracks WHEN 1 THEN chi2 IS NULL AND degrees IS NULL ELSE "
+                                        "degrees = 12 * tracks - 6 AND chi2 < degrees END",
+                                        0, 0),
+                     3);
     bst_run_reader_close(run);
     bst_world_free(world);
     scratch_remove(&place);
+}
+
+/* A filter that is carried to another object's elements predicts what it did: places, and their
+ * standard deviation, at the time of the change and a day before and after it. */
+static void carried_filters_predict_the_same(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double time_s = 1.5 * BST_DAY_S, sigma[BST_CUSTODY_STATE] = {150, 400, 90, 60, 250, 700};
+    bst_elements set = {.norad = 7,
+                        .epoch_utc_jd1 = 2459746.5,
+                        .eccentricity = 0.1,
+                        .inclination_rad = 0.9,
+                        .raan_rad = 1.0,
+                        .arg_perigee_rad = 2.0,
+                        .mean_anomaly_rad = 0.5,
+                        .mean_motion_radpmin = 0.02};
+    bst_custody_orbit from, to;
+    bst_custody_filter own = {.x = {600, -300, 200, 150, -250, 900}, .noise_until_s = 77.0}, anew;
+    for (int i = 0; i < BST_CUSTODY_STATE; i++) {
+        for (int k = 0; k < BST_CUSTODY_STATE; k++) {
+            own.p[i][k] = sigma[i] * sigma[k] * (i == k ? 1.0 : (i + k) % 2 ? 0.15 : -0.1);
+        }
+    }
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &from));
+    set.mean_anomaly_rad += 4e-5;
+    set.mean_motion_radpmin += 1e-9; /* 0.5 km in a day */
+    set.inclination_rad += 2e-5;
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &to));
+    assert_true(bst_run_new_object_carry(&from, &own, &to, time_s, &anew));
+    bst_assert_close(anew.noise_until_s, 77.0, 0.0);
+    for (int day = -1; day <= 1; day++) {
+        bst_vec3 place[2], unused;
+        double sd[2];
+        const double at_s = time_s + day * BST_DAY_S;
+        assert_true(bst_custody_state(&from, own.x, at_s, &place[0], &unused));
+        assert_true(bst_custody_state(&to, anew.x, at_s, &place[1], &unused));
+        /* of 0.9 km to 1.6 km between the elements; osculating differences are no mean ones */
+        assert_true(bst_vec3_norm(bst_vec3_sub(place[1], place[0])) < 30.0);
+        assert_true(bst_custody_predict_position(&from, &own, at_s, &unused, &sd[0]));
+        assert_true(bst_custody_predict_position(&to, &anew, at_s, &unused, &sd[1]));
+        bst_assert_close(sd[1], sd[0], 0.01 * sd[0]);
+    }
 }
 
 /* An object of tracks that the filters do not explain, though the first new one has its orbit
@@ -265,6 +316,7 @@ int main(void) {
         cmocka_unit_test(unknown_objects_become_candidates),
         cmocka_unit_test(candidates_become_objects),
         cmocka_unit_test(new_objects_match_the_catalogue),
+        cmocka_unit_test(carried_filters_predict_the_same),
         cmocka_unit_test(earlier_new_objects_keep_their_orbit),
         cmocka_unit_test(wrong_objects_are_counted_once),
         cmocka_unit_test(saved_candidates_are_of_the_world),

@@ -280,35 +280,30 @@ static void observed_sky_starts_fewer_tracks(void **state) {
     bst_assert_close(objects, 0.3, 1e-9);
 }
 
-/* Objects of any SNR about the threshold, seen for eight frames: the stated probability that the
- * ninth detects them is the share that it does. Those far above it are missed as the parameter
- * says, and so are all where the threshold is not known. */
-static void faint_objects_are_missed_as_stated(void **state) {
-    (void)state;
+/* Objects of any SNR about the threshold, of which a share is dark in each of eight frames: the
+ * stated probability that the ninth detects them, where they are lit, is the share that it does. */
+static void check_faint_objects(const bst_mtt *m, double dark) {
     enum { OBJECTS = 20000, FRAMES = 8, BINS = 9 };
-    const double threshold = 5.0;
-    bench *b = start_jointly(18 * AS);
-    bst_mtt *m = b->mtt;
-    m->threshold_snr = threshold;
-    m->params.brightness_random_walk_mag = 0.0;
-    double pd = m->params.detection_probability, stated[BINS] = {0}, found[BINS] = {0};
+    const double threshold = m->threshold_snr, pd = m->params.detection_probability;
+    double stated[BINS] = {0}, found[BINS] = {0};
     int count[BINS] = {0};
     bst_rng_key key = bst_rng_make_key(3, 0, "faint", "objects");
     for (int o = 0; o < OBJECTS; o++) {
-        bst_mtt_track track = {.may_miss = true};
+        bst_mtt_track track = {.may_miss = true, .dark = dark};
         double snr = threshold - 1.5 + 7.0 * bst_rng_uniform(key, 0, (uint64_t)o);
         bst_mtt_start_snr(&track);
         for (int k = 0; k <= FRAMES; k++) {
             uint64_t draw = (uint64_t)(o * (FRAMES + 1) + k);
             double seen = snr + bst_rng_normal(key, 1, draw);
             bool detected = seen > threshold && bst_rng_uniform(key, 2, draw) < pd;
+            bool lit = bst_rng_uniform(key, 3, draw) >= dark;
             if (k == FRAMES) {
                 double p = bst_mtt_detection_probability(m, &track);
                 int bin = (int)(10.0 * p);
                 stated[bin] += p;
                 found[bin] += detected;
                 count[bin]++;
-            } else if (detected) {
+            } else if (detected && lit) {
                 bst_mtt_note_snr(m, seen, &track);
             } else {
                 bst_mtt_note_missed(m, &track);
@@ -320,7 +315,20 @@ static void faint_objects_are_missed_as_stated(void **state) {
         double n = count[bin], p = stated[bin] / n, limit = 0.02 + 4.0 * sqrt(p * (1.0 - p) / n);
         assert_true(count[bin] == 0 || fabs(found[bin] / n - p) < limit);
     }
-    assert_true(count[1] > 500 && count[4] > 500 && count[8] > 500);
+    assert_true(count[2] > 500 && count[5] > 500 && count[8] > 500);
+}
+
+/* Those far above the threshold are missed as the parameter says, and so are all where it is not
+ * known. */
+static void faint_objects_are_missed_as_stated(void **state) {
+    (void)state;
+    bench *b = start_jointly(18 * AS);
+    bst_mtt *m = b->mtt;
+    m->threshold_snr = 5.0;
+    m->params.brightness_random_walk_mag = 0.0;
+    check_faint_objects(m, 0.0);
+    check_faint_objects(m, 0.5);
+    double pd = m->params.detection_probability;
     bst_mtt_track bright = {.may_miss = true};
     bst_mtt_start_snr(&bright);
     bst_mtt_note_snr(m, 30.0, &bright);
@@ -331,9 +339,34 @@ static void faint_objects_are_missed_as_stated(void **state) {
     bst_mtt_free(m);
 }
 
+/* A frame that says nothing spreads the SNR by the random walk of the brightness, and moves no
+ * mean: 0.05 mag of an SNR of 5 are 5 (10^0.02 - 1) = 0.235, and 0.230 to first order. */
+static void brightness_walks_at_random(void **state) {
+    (void)state;
+    bench *b = start_jointly(18 * AS);
+    bst_mtt *m = b->mtt;
+    bst_mtt_track track = {.dark = 1.0, .snr_level = {[3] = 1.0}};
+    m->threshold_snr = 5.0;
+    m->params.brightness_random_walk_mag = 0.05;
+    for (int k = 1; k <= 3; k++) {
+        double sum = 0.0, mean = 0.0, variance = 0.0;
+        bst_mtt_note_missed(m, &track);
+        for (int i = 0; i < BST_MTT_SNR_LEVELS; i++) {
+            sum += track.snr_level[i];
+            mean += track.snr_level[i] * i;
+            variance += track.snr_level[i] * (i - 3) * (i - 3);
+        }
+        bst_assert_close(sum, 1.0, 1e-12);
+        bst_assert_close(mean, 3.0, 1e-12);
+        bst_assert_close(sqrt(variance / k), 0.05 * log(10.0) / 2.5 * 5.0, 1e-12);
+    }
+    bst_mtt_free(m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(faint_objects_are_missed_as_stated),
+        cmocka_unit_test(brightness_walks_at_random),
         cmocka_unit_test(two_tracks_compete),
         cmocka_unit_test(misses_lower_existence),
         cmocka_unit_test(merged_measurement_is_inverted),

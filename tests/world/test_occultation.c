@@ -1,5 +1,6 @@
 /* Occultations of objects by others: areas against closed forms, and the light that is left. */
 #include "sim/world/scene/occultation.h"
+#include "sim/world/scene/view_shapes.h"
 #include "tests/world/world_support.h"
 
 static const bst_vec3 far_sun = {149597870700.0, 0, 0};
@@ -172,12 +173,54 @@ static void light_is_taken_away(void **state) {
     bst_assert_close(half - free, -2.5 * log10(lit), 1e-6);
 }
 
+/* Sunlight passes what is in front before the emission, the light to the observer after it, by the
+ * way over the speed of light. At those times a body as far ahead of the middle of the one in front
+ * as another is behind it loses as much. */
+static void light_takes_time_between_bodies(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double way_m = 6e4, late_s = way_m / 299792458.0; /* 1.5 m of the orbit */
+    bst_world *world =
+        test_world_with("{\"name\": \"front\", \"area_m2\": 1e6, \"occults\": true, " ORBIT
+                        "}, {\"name\": \"back\", \"area_m2\": 1e5, " ORBIT "}",
+                        "");
+    bst_world_view *view;
+    bst_sky_clock *clock;
+    bst_view_shapes shapes;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    bst_assert_ok(&ctx, bst_sky_clock_create_on(&ctx, world->sky_grid, &clock));
+    bst_assert_ok(&ctx, bst_view_shapes_create(&ctx, world, clock, &shapes));
+    for (int side = 0; side < 2; side++) {
+        bst_world_state front;
+        const double seconds = 100.0;
+        bst_assert_ok(&ctx, bst_world_view_object_state(
+                                &ctx, view, 0, seconds + (side ? late_s : -late_s), &front));
+        bst_vec3 along = bst_vec3_unit(front.velocity_mps);
+        bst_vec3 back = bst_vec3_unit(bst_vec3_cross(along, front.position_m));
+        double left[2];
+        for (int k = 0; k < 2; k++) {
+            bst_vec3 place = bst_vec3_axpy(bst_vec3_axpy(front.position_m, way_m, back),
+                                           k ? -560.0 : 560.0, along);
+            const bst_view_emission at = {.object = 1, .position_m = place, .seconds = seconds};
+            bst_view_mutual m =
+                bst_view_shapes_occultations(&shapes, &at, bst_vec3_axpy(place, -1e9, back),
+                                             bst_vec3_axpy(place, -1.5e11, back));
+            left[k] = side ? m.visible : m.sunlight;
+        }
+        assert_true(left[0] > 0.3 && left[0] < 0.7); /* where it changes by 0.2 % a metre */
+        bst_assert_close(left[0], left[1], 1e-4);
+    }
+    bst_view_shapes_free(&shapes);
+    bst_sky_clock_free(clock);
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spheres_hide_by_their_discs),
-        cmocka_unit_test(shadows_of_spheres),
-        cmocka_unit_test(shapes_hide_by_their_silhouettes),
-        cmocka_unit_test(light_is_taken_away),
+        cmocka_unit_test(spheres_hide_by_their_discs),      cmocka_unit_test(shadows_of_spheres),
+        cmocka_unit_test(shapes_hide_by_their_silhouettes), cmocka_unit_test(light_is_taken_away),
+        cmocka_unit_test(light_takes_time_between_bodies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
