@@ -3,9 +3,16 @@
 #include <assert.h>
 #include <string.h>
 
-/* Number of models of the IMM. */
 #include "sim/core/invariant.h"
+
+/* Number of models of the IMM. */
 #define MODELS 2
+/* Most components of one level of process noise. */
+#define LEVEL_COMPONENTS (BST_FILTER_COMPONENTS / BST_FILTER_LEVELS)
+
+/* Mean time that an object spends on a level of process noise, s. */
+static const double LEVEL_SOJOURN_S[BST_FILTER_LEVELS] = {[BST_FILTER_CONFIGURED] = 300.0,
+                                                          [BST_FILTER_STEADY] = 900.0};
 
 /* Lower Cholesky factor; columns of zero variance are zero. */
 static void cholesky_factor(const double p[4][4], double l[4][4]) {
@@ -61,7 +68,7 @@ void bst_sky_predict_unscented(bst_sky_state *state, double dt_s, double noise_r
 void bst_filter_start(const bst_filter_params *params, const bst_sky_state *state,
                       bst_filter_models *models) {
     assert(params && models && state && bst_is_covariance(&state->covariance[0][0], 4));
-    models->count = 0;
+    models->count = models->levels = 0;
     if (params->kind != BST_FILTER_IMM) {
         return;
     }
@@ -79,13 +86,17 @@ static void merge_models(const bst_filter_models *models, bst_sky_state *state) 
     bst_sky_mix(models->state, models->probability, models->count, state);
 }
 
+/* Probabilities that a two-state Markov chain leaves state 0, or state 1, within dt_s. */
+static void chain_changes(double sojourn0_s, double sojourn1_s, double dt_s, double change[2]) {
+    double both = 1.0 / sojourn0_s + 1.0 / sojourn1_s, settled = -expm1(-both * dt_s) / both;
+    change[0] = settled / sojourn0_s;
+    change[1] = settled / sojourn1_s;
+}
+
 /* IMM mixing of the two models by their transition probabilities over dt_s. */
 static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_models *models) {
-    double start = 1.0 / params->quiescent_sojourn_s, end = 1.0 / params->manoeuvre_sojourn_s,
-           both = start + end;
-    double settled = -expm1(-both * dt_s) / both;
-    /* probability flow out of model 0, out of model 1 */
-    double change[2] = {start * settled, end * settled};
+    double change[2];
+    chain_changes(params->quiescent_sojourn_s, params->manoeuvre_sojourn_s, dt_s, change);
     bst_filter_models before = *models;
     for (int to = 0; to < MODELS; to++) {
         double weights[MODELS];
@@ -101,11 +112,74 @@ static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_
 }
 
 /* Predicts one Gaussian by the EKF or UKF. */
-static void predict_gaussian(const bst_filter_params *params, double dt_s, bst_sky_state *state) {
+static void predict_gaussian(const bst_filter_params *params, double dt_s, double noise_rad2ps3,
+                             bst_sky_state *state) {
     if (params->kind == BST_FILTER_UKF) {
-        bst_sky_predict_unscented(state, dt_s, params->noise_rad2ps3);
+        bst_sky_predict_unscented(state, dt_s, noise_rad2ps3);
     } else {
-        bst_sky_predict(state, dt_s, params->noise_rad2ps3);
+        bst_sky_predict(state, dt_s, noise_rad2ps3);
+    }
+}
+
+/* Gives each component both levels of process noise. */
+static void start_levels(const bst_sky_state *state, bst_filter_models *models) {
+    if (models->count == 0) {
+        models->count = 1;
+        models->state[0] = *state;
+        models->probability[0] = 1.0;
+    }
+    int n = bst_sky_reduce(models->state, models->probability, models->count, LEVEL_COMPONENTS);
+    double both = LEVEL_SOJOURN_S[0] + LEVEL_SOJOURN_S[1];
+    for (int i = 0; i < n; i++) {
+        models->state[n + i] = models->state[i];
+        models->probability[n + i] = models->probability[i] * LEVEL_SOJOURN_S[1] / both;
+        models->probability[i] *= LEVEL_SOJOURN_S[0] / both;
+        models->level[i] = 0;
+        models->level[n + i] = 1;
+    }
+    models->count = 2 * n;
+    models->levels = BST_FILTER_LEVELS;
+}
+
+/* Appends the hypotheses of one level, reduced to `keep`, to the components. */
+static void append_level(bst_filter_models *models, int level, bst_sky_state *hypotheses,
+                         double *weights, int n, int keep) {
+    double total = 0.0;
+    for (int i = 0; i < n; i++) {
+        total += weights[i];
+    }
+    if (!(total > 0.0)) {
+        return;
+    }
+    n = bst_sky_reduce(hypotheses, weights, n, keep);
+    for (int i = 0; i < n; i++) {
+        int at = models->count++;
+        assert(at < BST_FILTER_COMPONENTS);
+        models->state[at] = hypotheses[i];
+        models->probability[at] = weights[i] * total;
+        models->level[at] = level;
+    }
+}
+
+/* Changes between the levels of process noise over dt_s. */
+static void switch_levels(double dt_s, bst_filter_models *models) {
+    double change[BST_FILTER_LEVELS];
+    chain_changes(LEVEL_SOJOURN_S[0], LEVEL_SOJOURN_S[1], dt_s, change);
+    bst_filter_models before = *models;
+    models->count = 0;
+    for (int level = 0; level < BST_FILTER_LEVELS; level++) {
+        bst_sky_state moved[BST_FILTER_COMPONENTS];
+        double weights[BST_FILTER_COMPONENTS];
+        int own = 0;
+        for (int i = 0; i < before.count; i++) {
+            int from = before.level[i];
+            moved[i] = before.state[i];
+            weights[i] =
+                before.probability[i] * (from == level ? 1.0 - change[from] : change[from]);
+            own += from == level;
+        }
+        /* all components of a level that had none are of the other one */
+        append_level(models, level, moved, weights, before.count, own > 0 ? own : before.count);
     }
 }
 
@@ -113,8 +187,17 @@ void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_st
                         bst_filter_models *models) {
     assert(params && state && models && dt_s >= 0.0);
     assert(models->count >= 0 && models->count <= BST_FILTER_COMPONENTS);
+    bool adaptive = params->kind != BST_FILTER_IMM && params->steady_noise_rad2ps3 > 0.0;
+    if (!adaptive || models->count == 0) {
+        models->levels = 0;
+    }
+    if (adaptive && models->levels == 0) {
+        start_levels(state, models);
+    } else if (adaptive) {
+        switch_levels(dt_s, models);
+    }
     if (models->count == 0) {
-        predict_gaussian(params, dt_s, state);
+        predict_gaussian(params, dt_s, params->noise_rad2ps3, state);
         return;
     }
     if (params->kind == BST_FILTER_IMM) {
@@ -123,7 +206,10 @@ void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_st
         bst_sky_predict(&models->state[1], dt_s, params->manoeuvre_noise_rad2ps3);
     } else {
         for (int m = 0; m < models->count; m++) {
-            predict_gaussian(params, dt_s, &models->state[m]);
+            bool steady = models->levels > 0 && models->level[m] == BST_FILTER_STEADY;
+            predict_gaussian(params, dt_s,
+                             steady ? params->steady_noise_rad2ps3 : params->noise_rad2ps3,
+                             &models->state[m]);
         }
     }
     merge_models(models, state);
@@ -248,6 +334,41 @@ static void update_models(bst_filter_models *models, const bst_filter_evidence *
     }
 }
 
+/* Updates the components of each level of process noise, whose share follows their total
+ * likelihood. */
+static void update_levels(bst_filter_models *models, const bst_filter_evidence *evidence,
+                          int components) {
+    enum { MOST = BST_FILTER_COMPONENTS * (BST_FILTER_CANDIDATES + 1) };
+    bst_sky_state hypotheses[MOST];
+    double weights[MOST], sum = 0.0;
+    int first[BST_FILTER_LEVELS + 1] = {0}, n = 0;
+    for (int level = 0; level < BST_FILTER_LEVELS; level++) {
+        for (int m = 0; m < models->count; m++) {
+            if (models->level[m] == level && models->probability[m] > 0.0) {
+                n = branch_hypotheses(&models->state[m], log(models->probability[m]), evidence,
+                                      hypotheses, weights, n);
+            }
+        }
+        first[level + 1] = n;
+    }
+    if (n == 0) {
+        return;
+    }
+    (void)to_weights(weights, n);
+    for (int i = 0; i < n; i++) {
+        sum += weights[i];
+    }
+    for (int i = 0; i < n; i++) {
+        weights[i] /= sum;
+    }
+    int keep = components > BST_FILTER_LEVELS ? components / BST_FILTER_LEVELS : 1;
+    models->count = 0;
+    for (int level = 0; level < BST_FILTER_LEVELS; level++) {
+        append_level(models, level, hypotheses + first[level], weights + first[level],
+                     first[level + 1] - first[level], keep);
+    }
+}
+
 /* Updates a mixture and reduces it to at most the given number of components. */
 static void update_mixture(const bst_sky_state *state, bst_filter_models *models,
                            const bst_filter_evidence *evidence, int components) {
@@ -280,6 +401,9 @@ void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
     assert(components >= 1 && components <= BST_FILTER_COMPONENTS);
     if (params->kind == BST_FILTER_IMM && models->count > 0) {
         update_models(models, evidence);
+        merge_models(models, state);
+    } else if (models->count > 0 && models->levels > 0) {
+        update_levels(models, evidence, components);
         merge_models(models, state);
     } else if (models->count > 0 || components > 1) {
         update_mixture(state, models, evidence, components);
