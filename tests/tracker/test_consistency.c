@@ -26,6 +26,8 @@ typedef struct setup {
     double dec_deg, rate_arcsec; /* where and how fast */
     bool manoeuvres;             /* as the IMM's own models have it */
     int steps;                   /* judged, at most STEPS */
+    bool adaptive;               /* process noise with a steady level */
+    double driven;               /* adaptive: share of the noise that drives the object */
 } setup;
 
 typedef struct figures {
@@ -35,6 +37,7 @@ typedef struct figures {
     int lost;
 } figures;
 
+static const double STEADY_SHARE = 0.1; /* of the default configuration */
 static const double noise_as = 0.02, manoeuvre_as = 1.0, quiescent_sojourn_s = 60.0,
                     manoeuvre_sojourn_s = 10.0, sigma_as = 0.3, dt_s = 1.0, gate = 16.0;
 
@@ -45,6 +48,8 @@ static bst_mtt_params make_params(const setup *s, double alarms_per_frame) {
                             .filter = s->filter,
                             .association = s->association,
                             .noise_rad2ps3 = pow(noise_as * AS, 2),
+                            .steady_noise_rad2ps3 =
+                                s->adaptive ? pow(STEADY_SHARE * noise_as * AS, 2) : 0.0,
                             .manoeuvre_noise_rad2ps3 = pow(manoeuvre_as * AS, 2),
                             .quiescent_sojourn_s = quiescent_sojourn_s,
                             .manoeuvre_sojourn_s = manoeuvre_sojourn_s,
@@ -77,10 +82,10 @@ static double settled_area(double pd) {
     return (p[0][0] + r[0]) / (AS * AS);
 }
 
-/* White acceleration over dt on a true state. */
-static void random_walk(bst_sky_state *truth, bool manoeuvres, bst_rng_key key, uint64_t run,
+/* White acceleration over dt on a true state, arcsec/s^1.5. */
+static void random_walk(bst_sky_state *truth, double acceleration_as, bst_rng_key key, uint64_t run,
                         uint64_t k) {
-    double q = pow((manoeuvres ? manoeuvre_as : noise_as) * AS, 2), n[4];
+    double q = pow(acceleration_as * AS, 2), n[4];
     bst_rng_normal2(key, run, 2 * k, n);
     bst_rng_normal2(key, run, 2 * k + 1, n + 2);
     bst_sky_predict(truth, dt_s, 0.0);
@@ -121,6 +126,7 @@ static void monte_carlo(const setup *s, figures *out) {
     double per_as2 = s->alarms_per_gate / (BST_PI * gate * settled_area(s->pd));
     double mean = per_as2 * 4.0 * HALF_AS * HALF_AS;
     bst_mtt_params params = make_params(s, mean);
+    double quiet_as = s->adaptive ? s->driven * noise_as : noise_as, bound_q = pow(quiet_as * AS, 2);
     const double r[3] = {pow(sigma_as * AS, 2), 0.0, pow(sigma_as * AS, 2)};
     double factor = bst_eval_information_factor(s->pd, per_as2 * sigma_as * sigma_as);
     double angle2 = 0.0, rate2 = 0.0, bound_angle2 = 0.0, bound_rate2 = 0.0;
@@ -147,7 +153,7 @@ static void monte_carlo(const setup *s, figures *out) {
                 turning =
                     turning ? u0 > mixed / manoeuvre_sojourn_s : u0 < mixed / quiescent_sojourn_s;
             }
-            random_walk(&truth, turning, key, 1, (uint64_t)k);
+            random_walk(&truth, turning ? manoeuvre_as : quiet_as, key, 1, (uint64_t)k);
             bst_rng_normal2(key, 2, (uint64_t)k, n);
             bool seen = k < CLEAN || bst_rng_uniform(key, 3, (uint64_t)k) < s->pd;
             bst_mtt_detection own = see(truth.direction, sigma_as * n[0], sigma_as * n[1]);
@@ -171,6 +177,7 @@ static void monte_carlo(const setup *s, figures *out) {
                 bst_filter_params filter = {
                     .kind = params.filter,
                     .noise_rad2ps3 = params.noise_rad2ps3,
+                    .steady_noise_rad2ps3 = params.steady_noise_rad2ps3,
                     .manoeuvre_noise_rad2ps3 = params.manoeuvre_noise_rad2ps3,
                     .quiescent_sojourn_s = params.quiescent_sojourn_s,
                     .manoeuvre_sojourn_s = params.manoeuvre_sojourn_s};
@@ -192,10 +199,9 @@ static void monte_carlo(const setup *s, figures *out) {
             bst_mtt_step(mtt, &f);
             track = confirmed(mtt);
             if (k == 1) {
-                assert_true(bst_track_bound_start(&bound, r, r, dt_s, params.noise_rad2ps3));
+                assert_true(bst_track_bound_start(&bound, r, r, dt_s, bound_q));
             } else if (k > 1) {
-                assert_true(bst_track_bound_step(&bound, dt_s, s->rate_arcsec * AS,
-                                                 params.noise_rad2ps3, r,
+                assert_true(bst_track_bound_step(&bound, dt_s, s->rate_arcsec * AS, bound_q, r,
                                                  k < CLEAN ? 1.0 : factor));
             }
             if (k == START && !track) {
@@ -320,11 +326,26 @@ static void other_associations_in_clutter(void **state) {
     assert_true(f.lost <= runs / 40);
 }
 
+/* Objects on either level of process noise, and on straight paths. */
+static void adaptive_noise(void **state) {
+    (void)state;
+    const setup cases[] = {
+        {"driven", BST_FILTER_EKF, BST_MTT_PMB, 0.9, 0.0, 20, 50, false, STEPS, true, 1.0},
+        {"steady", BST_FILTER_EKF, BST_MTT_PMB, 0.9, 0.0, 20, 50, false, STEPS, true, STEADY_SHARE},
+        {"straight", BST_FILTER_EKF, BST_MTT_PMB, 0.9, 0.0, 20, 50, false, STEPS, true, 0.0},
+        {"half", BST_FILTER_EKF, BST_MTT_PMB, 0.9, 0.0, 20, 50, false, STEPS, true, 0.3}};
+    for (int i = 0; i < 4; i++) {
+        figures f;
+        monte_carlo(&cases[i], &f);
+        assert_int_equal(f.lost, 0);
+    }
+}
+
 int main(int argc, char **argv) {
     bool slow = argc > 1 && strcmp(argv[1], "slow") == 0;
     clutter_steps = slow ? STEPS : FEW;
     runs = slow ? MOST_RUNS : runs;
-    const struct CMUnitTest tests[] = {cmocka_unit_test(filters_without_clutter),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(adaptive_noise), cmocka_unit_test(filters_without_clutter),
                                        cmocka_unit_test(imm_through_manoeuvres),
                                        cmocka_unit_test(single_target_in_clutter),
                                        cmocka_unit_test(other_associations_in_clutter)};
