@@ -10,9 +10,8 @@
 /* Most components of one level of process noise. */
 #define LEVEL_COMPONENTS (BST_FILTER_COMPONENTS / BST_FILTER_LEVELS)
 
-/* Mean time that an object spends on a level of process noise, s. */
-static const double LEVEL_SOJOURN_S[BST_FILTER_LEVELS] = {[BST_FILTER_CONFIGURED] = 300.0,
-                                                          [BST_FILTER_STEADY] = 900.0};
+/* Mean time after which an object takes any level of process noise anew, s. */
+static const double LEVEL_SOJOURN_S = 1000.0;
 
 /* Lower Cholesky factor; columns of zero variance are zero. */
 static void cholesky_factor(const double p[4][4], double l[4][4]) {
@@ -86,17 +85,13 @@ static void merge_models(const bst_filter_models *models, bst_sky_state *state) 
     bst_sky_mix(models->state, models->probability, models->count, state);
 }
 
-/* Probabilities that a two-state Markov chain leaves state 0, or state 1, within dt_s. */
-static void chain_changes(double sojourn0_s, double sojourn1_s, double dt_s, double change[2]) {
-    double both = 1.0 / sojourn0_s + 1.0 / sojourn1_s, settled = -expm1(-both * dt_s) / both;
-    change[0] = settled / sojourn0_s;
-    change[1] = settled / sojourn1_s;
-}
-
 /* IMM mixing of the two models by their transition probabilities over dt_s. */
 static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_models *models) {
-    double change[2];
-    chain_changes(params->quiescent_sojourn_s, params->manoeuvre_sojourn_s, dt_s, change);
+    double start = 1.0 / params->quiescent_sojourn_s, end = 1.0 / params->manoeuvre_sojourn_s,
+           both = start + end;
+    double settled = -expm1(-both * dt_s) / both;
+    /* probability flow out of model 0, out of model 1 */
+    double change[2] = {start * settled, end * settled};
     bst_filter_models before = *models;
     for (int to = 0; to < MODELS; to++) {
         double weights[MODELS];
@@ -121,7 +116,14 @@ static void predict_gaussian(const bst_filter_params *params, double dt_s, doubl
     }
 }
 
-/* Gives each component both levels of process noise. */
+/* Power spectral density of the acceleration on a level of process noise. */
+static double level_noise(const bst_filter_params *params, int level) {
+    double share = (double)level / (BST_FILTER_LEVELS - 1);
+    return params->noise_rad2ps3 *
+           pow(params->steady_noise_rad2ps3 / params->noise_rad2ps3, share);
+}
+
+/* Gives each component all levels of process noise. */
 static void start_levels(const bst_sky_state *state, bst_filter_models *models) {
     if (models->count == 0) {
         models->count = 1;
@@ -129,15 +131,15 @@ static void start_levels(const bst_sky_state *state, bst_filter_models *models) 
         models->probability[0] = 1.0;
     }
     int n = bst_sky_reduce(models->state, models->probability, models->count, LEVEL_COMPONENTS);
-    double both = LEVEL_SOJOURN_S[0] + LEVEL_SOJOURN_S[1];
     for (int i = 0; i < n; i++) {
-        models->state[n + i] = models->state[i];
-        models->probability[n + i] = models->probability[i] * LEVEL_SOJOURN_S[1] / both;
-        models->probability[i] *= LEVEL_SOJOURN_S[0] / both;
-        models->level[i] = 0;
-        models->level[n + i] = 1;
+        models->probability[i] /= BST_FILTER_LEVELS;
     }
-    models->count = 2 * n;
+    for (int i = 0; i < n * BST_FILTER_LEVELS; i++) {
+        models->state[i] = models->state[i % n];
+        models->probability[i] = models->probability[i % n];
+        models->level[i] = i / n;
+    }
+    models->count = n * BST_FILTER_LEVELS;
     models->levels = BST_FILTER_LEVELS;
 }
 
@@ -151,7 +153,12 @@ static void append_level(bst_filter_models *models, int level, bst_sky_state *hy
     if (!(total > 0.0)) {
         return;
     }
-    n = bst_sky_reduce(hypotheses, weights, n, keep);
+    if (n > 1 && keep == 1) {
+        bst_sky_mix(hypotheses, weights, n, &hypotheses[0]);
+        weights[0] = n = 1;
+    } else {
+        n = bst_sky_reduce(hypotheses, weights, n, keep);
+    }
     for (int i = 0; i < n; i++) {
         int at = models->count++;
         assert(at < BST_FILTER_COMPONENTS);
@@ -163,8 +170,7 @@ static void append_level(bst_filter_models *models, int level, bst_sky_state *hy
 
 /* Changes between the levels of process noise over dt_s. */
 static void switch_levels(double dt_s, bst_filter_models *models) {
-    double change[BST_FILTER_LEVELS];
-    chain_changes(LEVEL_SOJOURN_S[0], LEVEL_SOJOURN_S[1], dt_s, change);
+    double anew = -expm1(-dt_s / LEVEL_SOJOURN_S) / BST_FILTER_LEVELS;
     bst_filter_models before = *models;
     models->count = 0;
     for (int level = 0; level < BST_FILTER_LEVELS; level++) {
@@ -172,14 +178,14 @@ static void switch_levels(double dt_s, bst_filter_models *models) {
         double weights[BST_FILTER_COMPONENTS];
         int own = 0;
         for (int i = 0; i < before.count; i++) {
-            int from = before.level[i];
+            bool stays = before.level[i] == level;
             moved[i] = before.state[i];
-            weights[i] =
-                before.probability[i] * (from == level ? 1.0 - change[from] : change[from]);
-            own += from == level;
+            weights[i] = before.probability[i] *
+                         (stays ? 1.0 - (BST_FILTER_LEVELS - 1) * anew : anew);
+            own += stays;
         }
-        /* all components of a level that had none are of the other one */
-        append_level(models, level, moved, weights, before.count, own > 0 ? own : before.count);
+        append_level(models, level, moved, weights, before.count,
+                     own > 0 ? own : LEVEL_COMPONENTS);
     }
 }
 
@@ -206,10 +212,9 @@ void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_st
         bst_sky_predict(&models->state[1], dt_s, params->manoeuvre_noise_rad2ps3);
     } else {
         for (int m = 0; m < models->count; m++) {
-            bool steady = models->levels > 0 && models->level[m] == BST_FILTER_STEADY;
-            predict_gaussian(params, dt_s,
-                             steady ? params->steady_noise_rad2ps3 : params->noise_rad2ps3,
-                             &models->state[m]);
+            double noise =
+                models->levels > 0 ? level_noise(params, models->level[m]) : params->noise_rad2ps3;
+            predict_gaussian(params, dt_s, noise, &models->state[m]);
         }
     }
     merge_models(models, state);

@@ -23,10 +23,11 @@ typedef struct bst_filter_params {
 } bst_filter_params;
 
 /* Most mixture components of a filter. */
-#define BST_FILTER_COMPONENTS 8
+#define BST_FILTER_COMPONENTS 12
 
-/* Level of process noise that a component of an adaptive filter assumes. */
-enum { BST_FILTER_CONFIGURED = 0, BST_FILTER_STEADY, BST_FILTER_LEVELS };
+/* Levels of process noise of an adaptive filter: 0 has the configured density, the last one that of
+ * a steady object, those between are spaced evenly in their logarithm. */
+enum { BST_FILTER_LEVELS = 3 };
 
 /* Models of an IMM (0 quiet, 1 manoeuvring), or components of a mixture of association hypotheses
  * and levels of process noise. The state is their mean and covariance. */
@@ -58,10 +59,10 @@ void bst_filter_start(const bst_filter_params *params, const bst_sky_state *stat
 
 /* Predicts state and models over dt_s >= 0.
  *
- * Notes:     with a steady level each component assumes one level of process noise, steady or
- *            configured. Components without levels get both, by the share of time that objects
- *            spend on each. Then they change by a two-state Markov chain, and components of a level
- *            are merged to as many as it had. Without a steady level, levels are forgotten.
+ * Notes:     with steady_noise_rad2ps3 each component assumes a level of process noise. Components
+ *            without levels get all of them, equally probable. From then on an object takes any
+ *            level anew at random times, and each level's components are merged to as many as it
+ *            had. Without steady_noise_rad2ps3 levels are forgotten.
  * EKF: bst_sky_predict. UKF: bst_sky_predict_unscented. IMM: mixing of the two models with the
  * transition probabilities of a two-state Markov chain in continuous time, then bst_sky_predict in
  * each; the state becomes their mixture.
@@ -102,8 +103,8 @@ typedef struct bst_filter_evidence {
  *            components = 1 merges the mixture to one Gaussian of the same mean and covariance
  *            (for an IMM one per model, whose probability follows the model's total likelihood).
  *            More components, not for an IMM, let later detections decide between hypotheses.
- *            Components of different levels of process noise are not merged; each level keeps half
- *            of `components`, at least one.
+ *            Components of different levels of process noise are not merged; each level keeps
+ *            its part of `components`, at least one.
  * Reference: Bar-Shalom and Tse 1975 (PDA); Salmond 1990 (mixture reduction) */
 void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
                        bst_filter_models *models, const bst_filter_evidence *evidence,
