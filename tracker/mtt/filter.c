@@ -119,8 +119,7 @@ static void predict_gaussian(const bst_filter_params *params, double dt_s, doubl
 /* Power spectral density of the acceleration on a level of process noise. */
 static double level_noise(const bst_filter_params *params, int level) {
     double share = (double)level / (BST_FILTER_LEVELS - 1);
-    return params->noise_rad2ps3 *
-           pow(params->steady_noise_rad2ps3 / params->noise_rad2ps3, share);
+    return params->noise_rad2ps3 * pow(params->steady_noise_rad2ps3 / params->noise_rad2ps3, share);
 }
 
 /* Gives each component all levels of process noise. */
@@ -180,12 +179,11 @@ static void switch_levels(double dt_s, bst_filter_models *models) {
         for (int i = 0; i < before.count; i++) {
             bool stays = before.level[i] == level;
             moved[i] = before.state[i];
-            weights[i] = before.probability[i] *
-                         (stays ? 1.0 - (BST_FILTER_LEVELS - 1) * anew : anew);
+            weights[i] =
+                before.probability[i] * (stays ? 1.0 - (BST_FILTER_LEVELS - 1) * anew : anew);
             own += stays;
         }
-        append_level(models, level, moved, weights, before.count,
-                     own > 0 ? own : LEVEL_COMPONENTS);
+        append_level(models, level, moved, weights, before.count, own > 0 ? own : LEVEL_COMPONENTS);
     }
 }
 
