@@ -28,6 +28,9 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Standard deviation of the attitude telemetry before any fix."),
     BST_REAL(C, process_noise_arcsec_per_s15, "arcsec/s^1.5", 0, 1e4, "0.02",
              "Square root of the power spectral density of the objects' angular acceleration."),
+    BST_REAL(C, steady_noise_share, "", 1e-3, 1, "0.1",
+             "Confirmed tracks learn whether their object needs process_noise_arcsec_per_s15 or "
+             "only this share of it; 1: all have process_noise_arcsec_per_s15. Not with type imm."),
     BST_REAL(C, gate_chi2, "", 1, 1e3, "16", "Gate of a detection, 2 degrees of freedom."),
     BST_REAL(
         C, detection_probability, "", 0.01, 0.999, "0.9",

@@ -70,6 +70,10 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .filter = c->filter,
         .association = (bst_mtt_association)c->association,
         .noise_rad2ps3 = square(arcsec(c->process_noise_arcsec_per_s15)),
+        .steady_noise_rad2ps3 =
+            c->steady_noise_share < 1.0
+                ? square(arcsec(c->process_noise_arcsec_per_s15) * c->steady_noise_share)
+                : 0.0,
         .manoeuvre_noise_rad2ps3 = square(arcsec(c->manoeuvre_noise_arcsec_per_s15)),
         .quiescent_sojourn_s = c->quiescent_sojourn_s,
         .manoeuvre_sojourn_s = c->manoeuvre_sojourn_s,

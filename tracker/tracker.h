@@ -20,7 +20,8 @@ typedef struct bst_tracker_config {
     bst_filter_kind filter; /* not in the table, which sets BST_FILTER_EKF; the caller sets it */
     double star_systematic_px, star_reject_chi2, max_attitude_sigma_px, max_roll_sigma_arcsec;
     double drift_sigma_arcsec_per_s, drift_noise_arcsec_per_s15, jitter_px, telemetry_sigma_arcsec;
-    double process_noise_arcsec_per_s15, gate_chi2, detection_probability, false_alarms_per_frame;
+    double process_noise_arcsec_per_s15, steady_noise_share;
+    double gate_chi2, detection_probability, false_alarms_per_frame;
     int64_t confirm_hits, confirm_frames;
     double confirm_score, max_rate_arcsec_per_s, cue_rate_margin_arcsec_per_s, initiation_gap_s;
     int64_t max_misses;

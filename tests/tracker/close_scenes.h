@@ -28,6 +28,7 @@ static inline bst_mtt_params close_parameters(bst_mtt_association association) {
                             .max_detections = CLOSE_DETECTIONS,
                             .association = association,
                             .noise_rad2ps3 = pow(0.02 * BST_ARCSEC_RAD, 2),
+                            .steady_noise_rad2ps3 = pow(0.002 * BST_ARCSEC_RAD, 2),
                             .manoeuvre_noise_rad2ps3 = pow(3 * BST_ARCSEC_RAD, 2),
                             .quiescent_sojourn_s = 3600,
                             .manoeuvre_sojourn_s = 60,

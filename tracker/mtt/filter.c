@@ -3,9 +3,15 @@
 #include <assert.h>
 #include <string.h>
 
-/* Number of models of the IMM. */
 #include "sim/core/invariant.h"
+
+/* Number of models of the IMM. */
 #define MODELS 2
+/* Most components of one level of process noise. */
+#define LEVEL_COMPONENTS (BST_FILTER_COMPONENTS / BST_FILTER_LEVELS)
+
+/* Mean time after which an object takes any level of process noise anew, s. */
+static const double LEVEL_SOJOURN_S = 1000.0;
 
 /* Lower Cholesky factor; columns of zero variance are zero. */
 static void cholesky_factor(const double p[4][4], double l[4][4]) {
@@ -61,7 +67,7 @@ void bst_sky_predict_unscented(bst_sky_state *state, double dt_s, double noise_r
 void bst_filter_start(const bst_filter_params *params, const bst_sky_state *state,
                       bst_filter_models *models) {
     assert(params && models && state && bst_is_covariance(&state->covariance[0][0], 4));
-    models->count = 0;
+    models->count = models->levels = 0;
     if (params->kind != BST_FILTER_IMM) {
         return;
     }
@@ -101,11 +107,83 @@ static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_
 }
 
 /* Predicts one Gaussian by the EKF or UKF. */
-static void predict_gaussian(const bst_filter_params *params, double dt_s, bst_sky_state *state) {
+static void predict_gaussian(const bst_filter_params *params, double dt_s, double noise_rad2ps3,
+                             bst_sky_state *state) {
     if (params->kind == BST_FILTER_UKF) {
-        bst_sky_predict_unscented(state, dt_s, params->noise_rad2ps3);
+        bst_sky_predict_unscented(state, dt_s, noise_rad2ps3);
     } else {
-        bst_sky_predict(state, dt_s, params->noise_rad2ps3);
+        bst_sky_predict(state, dt_s, noise_rad2ps3);
+    }
+}
+
+/* Power spectral density of the acceleration on a level of process noise. */
+static double level_noise(const bst_filter_params *params, int level) {
+    double share = (double)level / (BST_FILTER_LEVELS - 1);
+    return params->noise_rad2ps3 * pow(params->steady_noise_rad2ps3 / params->noise_rad2ps3, share);
+}
+
+/* Gives each component all levels of process noise. */
+static void start_levels(const bst_sky_state *state, bst_filter_models *models) {
+    if (models->count == 0) {
+        models->count = 1;
+        models->state[0] = *state;
+        models->probability[0] = 1.0;
+    }
+    int n = bst_sky_reduce(models->state, models->probability, models->count, LEVEL_COMPONENTS);
+    for (int i = 0; i < n; i++) {
+        models->probability[i] /= BST_FILTER_LEVELS;
+    }
+    for (int i = 0; i < n * BST_FILTER_LEVELS; i++) {
+        models->state[i] = models->state[i % n];
+        models->probability[i] = models->probability[i % n];
+        models->level[i] = i / n;
+    }
+    models->count = n * BST_FILTER_LEVELS;
+    models->levels = BST_FILTER_LEVELS;
+}
+
+/* Appends the hypotheses of one level, reduced to `keep`, to the components. */
+static void append_level(bst_filter_models *models, int level, bst_sky_state *hypotheses,
+                         double *weights, int n, int keep) {
+    double total = 0.0;
+    for (int i = 0; i < n; i++) {
+        total += weights[i];
+    }
+    if (!(total > 0.0)) {
+        return;
+    }
+    if (n > 1 && keep == 1) {
+        bst_sky_mix(hypotheses, weights, n, &hypotheses[0]);
+        weights[0] = n = 1;
+    } else {
+        n = bst_sky_reduce(hypotheses, weights, n, keep);
+    }
+    for (int i = 0; i < n; i++) {
+        int at = models->count++;
+        assert(at < BST_FILTER_COMPONENTS);
+        models->state[at] = hypotheses[i];
+        models->probability[at] = weights[i] * total;
+        models->level[at] = level;
+    }
+}
+
+/* Changes between the levels of process noise over dt_s. */
+static void switch_levels(double dt_s, bst_filter_models *models) {
+    double anew = -expm1(-dt_s / LEVEL_SOJOURN_S) / BST_FILTER_LEVELS;
+    bst_filter_models before = *models;
+    models->count = 0;
+    for (int level = 0; level < BST_FILTER_LEVELS; level++) {
+        bst_sky_state moved[BST_FILTER_COMPONENTS];
+        double weights[BST_FILTER_COMPONENTS];
+        int own = 0;
+        for (int i = 0; i < before.count; i++) {
+            bool stays = before.level[i] == level;
+            moved[i] = before.state[i];
+            weights[i] =
+                before.probability[i] * (stays ? 1.0 - (BST_FILTER_LEVELS - 1) * anew : anew);
+            own += stays;
+        }
+        append_level(models, level, moved, weights, before.count, own > 0 ? own : LEVEL_COMPONENTS);
     }
 }
 
@@ -113,8 +191,17 @@ void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_st
                         bst_filter_models *models) {
     assert(params && state && models && dt_s >= 0.0);
     assert(models->count >= 0 && models->count <= BST_FILTER_COMPONENTS);
+    bool adaptive = params->kind != BST_FILTER_IMM && params->steady_noise_rad2ps3 > 0.0;
+    if (!adaptive || models->count == 0) {
+        models->levels = 0;
+    }
+    if (adaptive && models->levels == 0) {
+        start_levels(state, models);
+    } else if (adaptive) {
+        switch_levels(dt_s, models);
+    }
     if (models->count == 0) {
-        predict_gaussian(params, dt_s, state);
+        predict_gaussian(params, dt_s, params->noise_rad2ps3, state);
         return;
     }
     if (params->kind == BST_FILTER_IMM) {
@@ -123,7 +210,9 @@ void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_st
         bst_sky_predict(&models->state[1], dt_s, params->manoeuvre_noise_rad2ps3);
     } else {
         for (int m = 0; m < models->count; m++) {
-            predict_gaussian(params, dt_s, &models->state[m]);
+            double noise =
+                models->levels > 0 ? level_noise(params, models->level[m]) : params->noise_rad2ps3;
+            predict_gaussian(params, dt_s, noise, &models->state[m]);
         }
     }
     merge_models(models, state);
@@ -248,6 +337,41 @@ static void update_models(bst_filter_models *models, const bst_filter_evidence *
     }
 }
 
+/* Updates the components of each level of process noise, whose share follows their total
+ * likelihood. */
+static void update_levels(bst_filter_models *models, const bst_filter_evidence *evidence,
+                          int components) {
+    enum { MOST = BST_FILTER_COMPONENTS * (BST_FILTER_CANDIDATES + 1) };
+    bst_sky_state hypotheses[MOST];
+    double weights[MOST], sum = 0.0;
+    int first[BST_FILTER_LEVELS + 1] = {0}, n = 0;
+    for (int level = 0; level < BST_FILTER_LEVELS; level++) {
+        for (int m = 0; m < models->count; m++) {
+            if (models->level[m] == level && models->probability[m] > 0.0) {
+                n = branch_hypotheses(&models->state[m], log(models->probability[m]), evidence,
+                                      hypotheses, weights, n);
+            }
+        }
+        first[level + 1] = n;
+    }
+    if (n == 0) {
+        return;
+    }
+    (void)to_weights(weights, n);
+    for (int i = 0; i < n; i++) {
+        sum += weights[i];
+    }
+    for (int i = 0; i < n; i++) {
+        weights[i] /= sum;
+    }
+    int keep = components > BST_FILTER_LEVELS ? components / BST_FILTER_LEVELS : 1;
+    models->count = 0;
+    for (int level = 0; level < BST_FILTER_LEVELS; level++) {
+        append_level(models, level, hypotheses + first[level], weights + first[level],
+                     first[level + 1] - first[level], keep);
+    }
+}
+
 /* Updates a mixture and reduces it to at most the given number of components. */
 static void update_mixture(const bst_sky_state *state, bst_filter_models *models,
                            const bst_filter_evidence *evidence, int components) {
@@ -280,6 +404,9 @@ void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
     assert(components >= 1 && components <= BST_FILTER_COMPONENTS);
     if (params->kind == BST_FILTER_IMM && models->count > 0) {
         update_models(models, evidence);
+        merge_models(models, state);
+    } else if (models->count > 0 && models->levels > 0) {
+        update_levels(models, evidence, components);
         merge_models(models, state);
     } else if (models->count > 0 || components > 1) {
         update_mixture(state, models, evidence, components);

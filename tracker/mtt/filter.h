@@ -14,6 +14,8 @@ typedef enum bst_filter_kind {
 typedef struct bst_filter_params {
     bst_filter_kind kind;
     double noise_rad2ps3; /* power spectral density of the acceleration; IMM: of the quiet model */
+    /* EKF and UKF: the object may be steady, with this smaller density; 0: there is one level */
+    double steady_noise_rad2ps3;
     /* IMM only */
     double manoeuvre_noise_rad2ps3;
     /* mean time between manoeuvres, and mean duration of a manoeuvre, > 0 */
@@ -21,12 +23,18 @@ typedef struct bst_filter_params {
 } bst_filter_params;
 
 /* Most mixture components of a filter. */
-#define BST_FILTER_COMPONENTS 8
+#define BST_FILTER_COMPONENTS 12
 
-/* Models of an IMM (0 quiet, 1 manoeuvring), or components of a mixture of association hypotheses.
- * The state is their mean and covariance. */
+/* Levels of process noise of an adaptive filter: 0 has the configured density, the last one that of
+ * a steady object, those between are spaced evenly in their logarithm. */
+enum { BST_FILTER_LEVELS = 3 };
+
+/* Models of an IMM (0 quiet, 1 manoeuvring), or components of a mixture of association hypotheses
+ * and levels of process noise. The state is their mean and covariance. */
 typedef struct bst_filter_models {
-    int count; /* 0: the state is a single Gaussian */
+    int count;  /* 0: the state is a single Gaussian */
+    int levels; /* BST_FILTER_LEVELS: components have levels, 0: they have none */
+    int level[BST_FILTER_COMPONENTS];
     bst_sky_state state[BST_FILTER_COMPONENTS];
     double probability[BST_FILTER_COMPONENTS];
 } bst_filter_models;
@@ -51,6 +59,10 @@ void bst_filter_start(const bst_filter_params *params, const bst_sky_state *stat
 
 /* Predicts state and models over dt_s >= 0.
  *
+ * Notes:     with steady_noise_rad2ps3 each component assumes a level of process noise. Components
+ *            without levels get all of them, equally probable. From then on an object takes any
+ *            level anew at random times, and each level's components are merged to as many as it
+ *            had. Without steady_noise_rad2ps3 levels are forgotten.
  * EKF: bst_sky_predict. UKF: bst_sky_predict_unscented. IMM: mixing of the two models with the
  * transition probabilities of a two-state Markov chain in continuous time, then bst_sky_predict in
  * each; the state becomes their mixture.
@@ -91,6 +103,8 @@ typedef struct bst_filter_evidence {
  *            components = 1 merges the mixture to one Gaussian of the same mean and covariance
  *            (for an IMM one per model, whose probability follows the model's total likelihood).
  *            More components, not for an IMM, let later detections decide between hypotheses.
+ *            Components of different levels of process noise are not merged; each level keeps
+ *            its part of `components`, at least one.
  * Reference: Bar-Shalom and Tse 1975 (PDA); Salmond 1990 (mixture reduction) */
 void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
                        bst_filter_models *models, const bst_filter_evidence *evidence,

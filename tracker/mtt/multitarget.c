@@ -94,6 +94,7 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
     m->params = *params;
     m->filter = (bst_filter_params){.kind = params->filter,
                                     .noise_rad2ps3 = params->noise_rad2ps3,
+                                    .steady_noise_rad2ps3 = params->steady_noise_rad2ps3,
                                     .manoeuvre_noise_rad2ps3 = params->manoeuvre_noise_rad2ps3,
                                     .quiescent_sojourn_s = params->quiescent_sojourn_s,
                                     .manoeuvre_sojourn_s = params->manoeuvre_sojourn_s};
@@ -146,11 +147,16 @@ static void shift_track(bst_mtt_track *track, const bst_mtt_frame *frame, bst_ve
 
 /* Filter parameters of a track. A filter other than IMM uses the manoeuvre process noise while the
  * innovations show a manoeuvre (adjustable process noise: Bar-Shalom, Li and Kirubarajan,
- * Estimation with Applications to Tracking and Navigation, 2001, section 11.2). */
+ * Estimation with Applications to Tracking and Navigation, 2001, section 11.2). Confirmed tracks
+ * adapt their noise. */
 static bst_filter_params filter_of(const bst_mtt *m, const bst_mtt_track *track) {
     bst_filter_params filter = m->filter;
     if (filter.kind != BST_FILTER_IMM && m->seconds < track->manoeuvre_end_s) {
         filter.noise_rad2ps3 = fmax(filter.noise_rad2ps3, filter.manoeuvre_noise_rad2ps3);
+        filter.steady_noise_rad2ps3 = 0.0;
+    }
+    if (track->status == BST_TRACK_TENTATIVE) {
+        filter.steady_noise_rad2ps3 = 0.0;
     }
     return filter;
 }
@@ -296,8 +302,9 @@ static void update_track(bst_mtt *m, int t) {
     track->merged_in_row = 0;
     track->misses_in_row = 0;
     track->hits++;
-    track->chi2 += fit.chi2;
-    track->last_chi2 = fit.chi2;
+    double chi2 = track->models.levels > 0 ? fit.innovation.chi2 : fit.chi2;
+    track->chi2 += chi2;
+    track->last_chi2 = chi2;
     track->score += log(m->params.detection_probability / m->clutter_density) + fit.log_likelihood;
     bst_mtt_note_place(track, detection);
     bst_mtt_note_fixed(m, detection, fit.log_likelihood, track);

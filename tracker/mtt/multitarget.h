@@ -47,6 +47,8 @@ typedef struct bst_mtt_params {
     bst_filter_kind filter;
     bst_mtt_association association;
     double noise_rad2ps3; /* power spectral density of the acceleration of a quiet object */
+    /* and of a steady one, smaller (filter.h); 0: the noise is not adapted; not with IMM */
+    double steady_noise_rad2ps3;
     /* manoeuvring object: acceleration, mean time between manoeuvres and mean duration; IMM only */
     double manoeuvre_noise_rad2ps3, quiescent_sojourn_s, manoeuvre_sojourn_s;
     double gate_chi2; /* 2 degrees of freedom */

@@ -3,7 +3,13 @@
 
 /* True if the numbers of a track by which arrays are accessed are in range. */
 static bool is_intact(const bst_mtt_track *track) {
-    return (unsigned)track->status <= BST_TRACK_COASTING &&
+    for (int i = 0; i < BST_FILTER_COMPONENTS; i++) {
+        if ((unsigned)track->models.level[i] >= BST_FILTER_LEVELS) {
+            return false;
+        }
+    }
+    return (unsigned)track->models.levels <= BST_FILTER_LEVELS &&
+           (unsigned)track->status <= BST_TRACK_COASTING &&
            (unsigned)track->sight <= BST_MTT_EARTH && track->models.count >= 0 &&
            track->models.count <= BST_FILTER_COMPONENTS && track->innovation_count >= 0 &&
            track->brightness_count >= 0;
