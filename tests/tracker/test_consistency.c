@@ -275,7 +275,7 @@ static void filters_without_clutter(void **state) {
 static void imm_through_manoeuvres(void **state) {
     (void)state;
     const setup imm = {"imm", BST_FILTER_IMM, BST_MTT_GNN, 0.95, 0.0, 20, 50, true, FEW};
-    const setup ekf = {"imm", BST_FILTER_EKF, BST_MTT_GNN, 0.95, 0.0, 20, 50, true, FEW};
+    const setup ekf = {"ekf", BST_FILTER_EKF, BST_MTT_GNN, 0.95, 0.0, 20, 50, true, FEW};
     figures with, without;
     int asked = runs;
     runs = MOST_RUNS; /* for the share of tracks that are lost, and they are short */
