@@ -287,7 +287,7 @@ static void imm_through_manoeuvres(void **state) {
     (void)state;
     const setup imm = {"imm", BST_FILTER_IMM, BST_MTT_GNN, 0.95,  0.0, 20,
                        50,    true,           FEW,         false, 0.0, 0};
-    const setup ekf = {"imm", BST_FILTER_EKF, BST_MTT_GNN, 0.95,  0.0, 20,
+    const setup ekf = {"ekf", BST_FILTER_EKF, BST_MTT_GNN, 0.95,  0.0, 20,
                        50,    true,           FEW,         false, 0.0, 0};
     figures with, without;
     int asked = runs;
