@@ -360,6 +360,36 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
     out->close -= out->best_is_close;
 }
 
+/* Variance of a rate that is left open, (rad/s)^2: no track moves by a radian a second. */
+#define OPEN_RATE 1.0
+
+/* What an arc measured in its middle. The orientation of TEME is that of its begin: in two hours
+ * it turns by 6e-8 rad. */
+static bst_custody_observation middle_of(const bst_run_arc *arc) {
+    const bst_od_observation *d = &arc->directions[arc->count / 2];
+    return (bst_custody_observation){
+        .observer = d->observer,
+        .gcrf_from_teme = arc->gcrf_from_teme[0],
+        .direction = d->direction,
+        .covariance = {
+            {d->cov_11, d->cov_12}, {d->cov_12, d->cov_22}, {[2] = OPEN_RATE}, {[3] = OPEN_RATE}}};
+}
+
+/* Finds the object of an arc by its last state. If that is in no one's gate, or is another's in
+ * truth, by a direction in its middle: the last state is wrong where the last attitudes are, as of
+ * frames before a slew. All directions decide in the update. */
+static void find_object_of_arc(bst_run_custody *c, int sensor, const bst_run_arc *arc, match *out) {
+    find_object(c, sensor, &arc->state, out);
+    const bool sure = out->best >= 0 && out->best == out->true_object;
+    if (!sure && arc->count >= LEAST_DIRECTIONS) {
+        const bst_custody_observation z = middle_of(arc);
+        match by_middle;
+        find_object(c, sensor, &z, &by_middle);
+        *out = out->best < 0 && by_middle.best >= 0 ? by_middle : *out;
+        out->true_object = by_middle.true_object;
+    }
+}
+
 /* Updates an object with the directions that were measured, which do not have the process noise of
  * the tracker; with its last state where there are too few. */
 static bool update(const bst_custody_orbit *orbit, const bst_run_arc *arc,
@@ -437,7 +467,7 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     bst_run_custody *c = user;
     const bst_custody_observation *z = &arc->state;
     match m;
-    find_object(c, sensor, z, &m);
+    find_object_of_arc(c, sensor, arc, &m);
     bst_custody_figures *f = &c->figures;
     const int new_one = m.best - c->object_count; /* index of it; below 0: catalogued */
     /* an image of two objects is that of neither, and may be in no one's gate */

@@ -83,6 +83,12 @@ static inline bst_track track_at(int64_t id, bst_vec3 direction, bst_vec3 rate_r
     return t;
 }
 
+/* A direction `off_rad` beside another one. */
+static inline bst_vec3 beside(bst_vec3 direction, double off_rad) {
+    const bst_tangent axes = bst_tangent_at(direction);
+    return bst_tangent_exp(direction, bst_tangent_vector(&axes, off_rad, 0.0));
+}
+
 /* Tracks of a frame: of `object` with `hits` detections, none in the last `misses` frames,
  * `off_rad` beside it; object below 0: none. */
 static inline void take_track(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int object,
@@ -97,8 +103,7 @@ static inline void take_track(bst_ctx *ctx, bst_run_custody *c, const bst_world 
         bst_assert_ok(ctx, bst_world_view_sight(ctx, view, 0, object, seconds, &now));
         bst_assert_ok(ctx, bst_world_view_sight(ctx, view, 0, object, seconds + 0.1, &later));
         bst_world_view_free(view);
-        bst_tangent axes = bst_tangent_at(now.geometric);
-        bst_vec3 d = bst_tangent_exp(now.geometric, bst_tangent_vector(&axes, off_rad, 0.0));
+        bst_vec3 d = beside(now.geometric, off_rad);
         bst_vec3 moved = bst_vec3_scale(bst_vec3_sub(later.geometric, now.geometric), 10.0);
         tracks->items[0] = track_at(id, d, bst_tangent_project(d, moved), hits);
         tracks->items[0].misses_in_row = misses;
@@ -106,6 +111,9 @@ static inline void take_track(bst_ctx *ctx, bst_run_custody *c, const bst_world 
     bst_assert_ok(ctx, bst_run_custody_tracks(ctx, c, 0, tracks));
     test_free(tracks);
 }
+
+/* Error of the attitude of the last frame of take_detected, and of the track's state with it. */
+static double last_off_rad;
 
 /* Six frames in which `objects` are detected, as track `id` and as seen from the field's middle;
  * one that ends it. */
@@ -120,21 +128,24 @@ static inline void take_detected(bst_ctx *ctx, bst_run_custody *c, const bst_wor
         bst_world_sight now, later;
         bst_assert_ok(ctx, bst_world_view_sight(ctx, view, 0, objects[k], now_s, &now));
         bst_assert_ok(ctx, bst_world_view_sight(ctx, view, 0, objects[k], now_s + 0.1, &later));
-        const bst_quat attitude = bst_quat_look(now.apparent, (bst_vec3){0.1, 0.2, 1.0});
+        const bst_vec3 up = {0.1, 0.2, 1.0};
+        const bst_quat attitude = bst_quat_look(now.apparent, up);
         bst_vec3 moved = bst_vec3_scale(bst_vec3_sub(later.geometric, now.geometric), 10.0);
         double x, y;
         assert_true(bst_camera_project(bst_world_camera(world, 0, 0),
                                        bst_quat_rotate(attitude, now.apparent), &x, &y));
         *found = (bst_detections){.exposure_id = 100 * id + k, .count = 1};
         found->items[0] = (bst_detection){.x_px = x, .y_px = y, .cov_xx = 0.01, .cov_yy = 0.01};
+        const double off_rad = k == 5 ? last_off_rad : 0.0;
         *tracks = (bst_tracks){
             .exposure_id = found->exposure_id,
             .tick = (int64_t)(now_s * RATE),
             .count = 1,
-            .attitude = {
-                .valid = true, .q_cam_from_gcrf = attitude, .sigma_rad = {sigma, sigma, sigma}}};
-        tracks->items[0] =
-            track_at(id, now.geometric, bst_tangent_project(now.geometric, moved), k + 1);
+            .attitude = {.valid = true,
+                         .q_cam_from_gcrf = bst_quat_look(beside(now.apparent, off_rad), up),
+                         .sigma_rad = {sigma, sigma, sigma}}};
+        const bst_vec3 seen = beside(now.geometric, off_rad);
+        tracks->items[0] = track_at(id, seen, bst_tangent_project(seen, moved), k + 1);
         tracks->items[0].x_px = x, tracks->items[0].y_px = y;
         bst_assert_ok(ctx, bst_run_custody_detections(ctx, c, 0, found));
         bst_assert_ok(ctx, bst_run_custody_tracks(ctx, c, 0, tracks));

@@ -380,6 +380,28 @@ static void directions_update_their_object(void **state) {
     bst_world_free(world);
 }
 
+/* A track whose last attitude is wrong by 60 arcsec, 12 km at its object, updates it by its other
+ * directions, and is no candidate. */
+static void a_wrong_last_attitude_loses_no_object(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_custody *c;
+    bst_custody_figures f;
+    const int own[6] = {0, 0, 0, 0, 0, 0};
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
+    last_off_rad = 60.0 * BST_ARCSEC_RAD;
+    take_detected(&ctx, c, world, own, 1, 100.0);
+    take_detected(&ctx, c, world, own, 2, 300.0);
+    last_off_rad = 0.0;
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 500.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.tracks == 2 && f.correlated == 2 && f.uncorrelated == 0 && f.cross_tags == 0);
+    assert_true(f.candidates == 0 && f.nees_mean < 20.0);
+    bst_run_custody_free(c);
+    bst_world_free(world);
+}
+
 static void off_and_without_objects(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -415,6 +437,7 @@ int main(void) {
         cmocka_unit_test(an_orbit_of_two_objects_is_no_third),
         cmocka_unit_test(a_filter_gets_its_object_back),
         cmocka_unit_test(directions_update_their_object),
+        cmocka_unit_test(a_wrong_last_attitude_loses_no_object),
         cmocka_unit_test(off_and_without_objects),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
