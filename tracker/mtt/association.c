@@ -15,8 +15,10 @@ static double alarm_gain(const bst_mtt *mtt) {
 
 void bst_mtt_recount_alarms(bst_mtt *mtt, const bst_mtt_track *track) {
     assert(mtt && track && track->hits >= 0);
-    /* hits of a few frames ago have nearly the weight of the latest frame */
-    mtt->alarms = fmax(mtt->alarms - alarm_gain(mtt) * track->hits, 0.0);
+    /* hits of a few frames ago have nearly the weight of the latest frame, all together that of one
+     * detection in each frame */
+    double part = fmin(alarm_gain(mtt) * track->hits, 1.0);
+    mtt->alarms = fmax(mtt->alarms - part, 0.0);
     bst_mtt_note_alarm(mtt, track->snr, -track->hits);
 }
 

@@ -59,14 +59,14 @@ void bst_filter_start(const bst_filter_params *params, const bst_sky_state *stat
 
 /* Predicts state and models over dt_s >= 0.
  *
- * Notes:     with steady_noise_rad2ps3 each component assumes a level of process noise. Components
- *            without levels get all of them, equally probable. From then on an object takes any
- *            level anew at random times, and each level's components are merged to as many as it
- *            had. Without steady_noise_rad2ps3 levels are forgotten.
  * EKF: bst_sky_predict. UKF: bst_sky_predict_unscented. IMM: mixing of the two models with the
  * transition probabilities of a two-state Markov chain in continuous time, then bst_sky_predict in
  * each; the state becomes their mixture.
  *
+ * Notes:     with steady_noise_rad2ps3 each component assumes a level of process noise. Components
+ *            without levels get all of them, equally probable. From then on an object takes any
+ *            level anew at random times, and each level's components are merged to as many as it
+ *            had. Without steady_noise_rad2ps3 levels are forgotten.
  * Reference: Blom and Bar-Shalom 1988 */
 void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_state *state,
                         bst_filter_models *models);
