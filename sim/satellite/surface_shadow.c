@@ -315,9 +315,16 @@ static void place_curved(const bst_satellite_pose *p, surface *w) {
     }
 }
 
-static double share_of(const light *sum, double *error) {
-    *error = sum->all > 0.0 ? *error / sum->all : 0.0;
-    return sum->all > 0.0 ? fmax(1.0 - sum->lost / sum->all, 0.0) : 1.0;
+/* The free share, and the bound of its error: the differences of panels may all be small by chance,
+ * so that a part shadow has at least what one panel may differ by. */
+static double share_of(const surface *w, const light *sum, double *error) {
+    if (!(sum->all > 0.0)) {
+        *error = 0.0;
+        return 1.0;
+    }
+    bool part = sum->lost > 0.0 && sum->lost < sum->all;
+    *error = (*error + (part ? w->tolerance : 0.0)) / sum->all;
+    return fmax(1.0 - sum->lost / sum->all, 0.0);
 }
 
 double bst_curved_free_share(bst_satellite_pose *p, int curved, double light_m2, double tolerance,
@@ -360,7 +367,7 @@ double bst_curved_free_share(bst_satellite_pose *p, int curved, double light_m2,
     for (int i = 0; i < panels; i++) {
         *error += add_range(&w, panel[i][0], panel[i][1], width, &sum);
     }
-    return share_of(&sum, error);
+    return share_of(&w, &sum, error);
 }
 
 bool bst_plane_is_round(const bst_satellite_pose *p, int index) {
@@ -419,5 +426,5 @@ double bst_plane_free_share(bst_satellite_pose *p, int index, double tolerance, 
     w.narrow = 0.5 * (high - low) / PLANE_PANELS;
     add_all_corners(&w, low, high);
     *error = add_range(&w, low, high, (high - low) / PLANE_PANELS, &sum);
-    return share_of(&sum, error);
+    return share_of(&w, &sum, error);
 }
