@@ -10,15 +10,14 @@ typedef struct breaks {
     int count;
 } breaks;
 
-/* Sorts the borders: few, so that insertion is fastest. */
-static void sort(breaks *b) {
-    for (int i = 1; i < b->count; i++) {
-        double x = b->at[i];
+void bst_sort_few(double *x, int count) {
+    for (int i = 1; i < count; i++) {
+        double at = x[i];
         int k = i;
-        for (; k > 0 && b->at[k - 1] > x; k--) {
-            b->at[k] = b->at[k - 1];
+        for (; k > 0 && x[k - 1] > at; k--) {
+            x[k] = x[k - 1];
         }
-        b->at[k] = x;
+        x[k] = at;
     }
 }
 
@@ -45,7 +44,7 @@ static breaks panels(double low, double high, double centre, double lobe_rad, bo
     } else {
         add(&b, 0.5 * (low + high), low, high);
     }
-    sort(&b);
+    bst_sort_few(b.at, b.count);
     return b;
 }
 
@@ -141,7 +140,7 @@ static double lambert_cone_light(const bst_curved *c, double diffuse, double rad
     if (!add_plain_zeros(&b, in) || !add_plain_zeros(&b, out)) {
         return 0.0;
     }
-    sort(&b);
+    bst_sort_few(b.at, b.count);
     double sum = 0.0;
     for (int p = 0; p + 1 < b.count; p++) {
         double from = b.at[p], to = b.at[p + 1], middle = 0.5 * (from + to);
@@ -172,7 +171,7 @@ static cone_waves waves_of(const bst_curved *c, const bst_brdf *brdf, bst_vec3 s
     w.borders = panels(from, from + 2.0 * BST_PI, half.peak, bst_brdf_lobe_rad(brdf), fine);
     add_zeros(&w.borders, w.in, from);
     add_zeros(&w.borders, w.out, from);
-    sort(&w.borders);
+    bst_sort_few(w.borders.at, w.borders.count);
     return w;
 }
 

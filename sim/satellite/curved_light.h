@@ -16,6 +16,9 @@
 double bst_curved_light(const bst_curved *curved, const bst_brdf *brdf, bst_vec3 sun,
                         bst_vec3 observer);
 
+/* Sorts a few numbers, by insertion. */
+void bst_sort_few(double *x, int count);
+
 /* Panels of such an integral, at most. */
 enum { BST_CURVED_PANELS_MAX = 16 };
 

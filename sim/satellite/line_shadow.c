@@ -51,11 +51,11 @@ static void take(spans *s, double low, double high) {
     s->count = kept;
 }
 
-static double larger(double a, double b) {
+static double greater_of(double a, double b) {
     return a > b ? a : b;
 }
 
-static double smaller(double a, double b) {
+static double lesser_of(double a, double b) {
     return a < b ? a : b;
 }
 
@@ -64,9 +64,9 @@ static void keep(line_view *l, double at_from, double at_to) {
     if (at_from < 0.0 && at_to < 0.0) {
         l->high = -1.0;
     } else if (at_from < 0.0) {
-        l->low = larger(l->low, at_from / (at_from - at_to));
+        l->low = greater_of(l->low, at_from / (at_from - at_to));
     } else if (at_to < 0.0) {
-        l->high = smaller(l->high, at_from / (at_from - at_to));
+        l->high = lesser_of(l->high, at_from / (at_from - at_to));
     }
 }
 
@@ -97,11 +97,11 @@ static void add_circle(bst_point2 from, bst_point2 step, double radius, line_vie
     double a = step.x * step.x + step.y * step.y, b = from.x * step.x + from.y * step.y;
     double c = from.x * from.x + from.y * from.y - radius * radius, root = b * b - a * c;
     if (root > 0.0 && a > 0.0) {
-        double half = sqrt(root), low = larger((-b - half) / a, 0.0);
-        double high = smaller((half - b) / a, 1.0);
+        double half = sqrt(root), low = greater_of((-b - half) / a, 0.0);
+        double high = lesser_of((half - b) / a, 1.0);
         if (low < high) {
-            l->low = smaller(l->low, low);
-            l->high = larger(l->high, high);
+            l->low = lesser_of(l->low, low);
+            l->high = greater_of(l->high, high);
         }
     } else if (c < 0.0 && !(a > 0.0)) {
         l->low = 0.0;
@@ -132,12 +132,12 @@ static void keep_within_bands(line_view *l, const bst_round_band *bands, int cou
         keep(&inner, a - b->cosine * from.y, c - b->cosine * to.y);
         keep(&inner, a + b->cosine * from.y, c + b->cosine * to.y);
         if (inner.low < inner.high) {
-            all.low = smaller(all.low, inner.low);
-            all.high = larger(all.high, inner.high);
+            all.low = lesser_of(all.low, inner.low);
+            all.high = greater_of(all.high, inner.high);
         }
     }
-    l->low = larger(l->low, all.low);
-    l->high = smaller(l->high, all.high);
+    l->low = greater_of(l->low, all.low);
+    l->high = lesser_of(l->high, all.high);
 }
 
 /* Keeps what is behind a face. */
@@ -173,7 +173,7 @@ static bst_round_band band_of(const bst_pose_view *v, bst_vec3 base, bst_vec3 ax
     if (across > 0.0) {
         b.along = (bst_point2){x / across, y / across};
     }
-    b.scale = 1.0 / larger(fabs(bst_vec3_dot(axis, v->z)), EDGE_ON);
+    b.scale = 1.0 / greater_of(fabs(bst_vec3_dot(axis, v->z)), EDGE_ON);
     b.apart = length_m * across * b.scale;
     b.tangents = b.apart > fabs(low_m - high_m);
     b.sine = b.tangents ? (low_m - high_m) / b.apart : 0.0;
@@ -308,9 +308,9 @@ static void add_ring(const bst_pose_view *v, const bst_line_ring *ring, double b
     for (int a = 0; a < 3; a++) {
         double middle = bst_vec3_dot(ring->centre, axes[a]);
         double along = bst_vec3_dot(ring->axis, axes[a]);
-        double reach = ring->radius_m * sqrt(larger(1.0 - along * along, 0.0));
-        b[2 * a] = smaller(b[2 * a], middle - reach);
-        b[2 * a + 1] = larger(b[2 * a + 1], middle + reach);
+        double reach = ring->radius_m * sqrt(greater_of(1.0 - along * along, 0.0));
+        b[2 * a] = lesser_of(b[2 * a], middle - reach);
+        b[2 * a + 1] = greater_of(b[2 * a + 1], middle + reach);
     }
 }
 
@@ -344,7 +344,7 @@ bool bst_line_shadow_make(bst_satellite_pose *p, int body, bool inside, const bs
     return n > 0;
 }
 
-BST_CLONES_256 double bst_line_shadow_lost(const bst_line_shadow *w, const bst_light_line *of) {
+BST_CLONES_256 static double lost_light(const bst_line_shadow *w, const bst_light_line *of) {
     spans free; /* what is beyond its count is not set */
     free.from[0] = 0.0;
     free.to[0] = 1.0;
@@ -358,12 +358,12 @@ BST_CLONES_256 double bst_line_shadow_lost(const bst_line_shadow *w, const bst_l
                        .to = {bst_vec3_dot(of->to, v->x), bst_vec3_dot(of->to, v->y)},
                        .high = 1.0};
         double a = bst_vec3_dot(of->from, v->z), b = bst_vec3_dot(of->to, v->z);
-        l.bounds[0] = smaller(l.from.x, l.to.x);
-        l.bounds[1] = larger(l.from.x, l.to.x);
-        l.bounds[2] = smaller(l.from.y, l.to.y);
-        l.bounds[3] = larger(l.from.y, l.to.y);
-        l.bounds[4] = smaller(a, b);
-        l.bounds[5] = larger(a, b);
+        l.bounds[0] = lesser_of(l.from.x, l.to.x);
+        l.bounds[1] = greater_of(l.from.x, l.to.x);
+        l.bounds[2] = lesser_of(l.from.y, l.to.y);
+        l.bounds[3] = greater_of(l.from.y, l.to.y);
+        l.bounds[4] = lesser_of(a, b);
+        l.bounds[5] = greater_of(a, b);
         for (int i = w->first[k]; i < w->first[k + 1] && free.count > 0; i++) {
             take_hidden(w, k, w->pose->hiders[i], of, &l, &free);
         }
@@ -376,7 +376,11 @@ BST_CLONES_256 double bst_line_shadow_lost(const bst_line_shadow *w, const bst_l
         double from = free.from[i], to = free.to[i];
         left += (to - from) * (of->from_weight + slope * (from + to));
     }
-    return larger(0.5 * (of->from_weight + of->to_weight) - left, 0.0);
+    return greater_of(0.5 * (of->from_weight + of->to_weight) - left, 0.0);
+}
+
+double bst_line_shadow_lost(const bst_line_shadow *w, const bst_light_line *of) {
+    return lost_light(w, of);
 }
 
 int bst_line_shadow_corners(const bst_line_shadow *w, int view, int index, int room,

@@ -168,17 +168,6 @@ static void add_break(breaks *b, double x) {
     }
 }
 
-static void sort(breaks *b) {
-    for (int i = 1; i < b->count; i++) {
-        double x = b->at[i];
-        int k = i;
-        for (; k > 0 && b->at[k - 1] > x; k--) {
-            b->at[k] = b->at[k - 1];
-        }
-        b->at[k] = x;
-    }
-}
-
 /* Azimuths where a ray of a view meets a curved surface, which is continued beyond its ends.
  *
  * Given:     r  a point of the ray, from the base
@@ -282,7 +271,7 @@ static double add_range(const surface *w, double from, double to, double widest,
             add_break(&b, w->place[n]);
         }
     }
-    sort(&b);
+    bst_sort_few(b.at, b.count);
     for (int n = 0; n + 1 < b.count; n++) {
         if (b.at[n + 1] - b.at[n] > 1e-9 * (to - from)) {
             error += add_panel(w, b.at[n], b.at[n + 1], HALVINGS, sum);
