@@ -7,6 +7,7 @@
 
 enum { SPANS_MAX = 32 };
 
+
 /* Least cosine between the axis of a ring and the view: its ellipse is this thin at most. */
 static const double EDGE_ON = 1e-6;
 
@@ -25,7 +26,7 @@ typedef struct line_view {
 
 /* Removes [low, high] from the free parts; the smaller part of a free one too where there is no
  * room for both. */
-static void take(spans *s, double low, double high) {
+BST_INLINED void take(spans *s, double low, double high) {
     int kept = 0, count = s->count;
     for (int i = 0; i < count; i++) {
         double from = s->from[i], to = s->to[i];
@@ -51,16 +52,16 @@ static void take(spans *s, double low, double high) {
     s->count = kept;
 }
 
-static double greater_of(double a, double b) {
+BST_INLINED double greater_of(double a, double b) {
     return a > b ? a : b;
 }
 
-static double lesser_of(double a, double b) {
+BST_INLINED double lesser_of(double a, double b) {
     return a < b ? a : b;
 }
 
 /* Keeps the part of the interval where a linear function is not below 0, given at the ends. */
-static void keep(line_view *l, double at_from, double at_to) {
+BST_INLINED void keep(line_view *l, double at_from, double at_to) {
     if (at_from < 0.0 && at_to < 0.0) {
         l->high = -1.0;
     } else if (at_from < 0.0) {
@@ -70,30 +71,39 @@ static void keep(line_view *l, double at_from, double at_to) {
     }
 }
 
-/* Keeps what is within a convex polygon of the view. */
-static void keep_within(line_view *l, const bst_half_planes *sides, int blocks) {
-    for (int b = 0; b < blocks && l->low < l->high; b++) {
-        double at_from[BST_HALF_PLANES], at_to[BST_HALF_PLANES];
-        bool out = false;
+/* Keeps what is within a convex polygon of the view: without branches, for wide registers. */
+BST_INLINED void keep_within(line_view *l, const bst_half_planes *sides, int blocks) {
+    double low[BST_HALF_PLANES], high[BST_HALF_PLANES];
+    for (int k = 0; k < BST_HALF_PLANES; k++) {
+        low[k] = l->low;
+        high[k] = l->high;
+    }
+    for (int b = 0; b < blocks; b++) {
+        const bst_half_planes *s = &sides[b];
         for (int k = 0; k < BST_HALF_PLANES; k++) {
-            at_from[k] = sides[b].u[k] * l->from.x + sides[b].v[k] * l->from.y + sides[b].w[k];
-            at_to[k] = sides[b].u[k] * l->to.x + sides[b].v[k] * l->to.y + sides[b].w[k];
-            out |= (at_from[k] < 0.0) | (at_to[k] < 0.0);
+            double from = s->u[k] * l->from.x + s->v[k] * l->from.y + s->w[k];
+            double to = s->u[k] * l->to.x + s->v[k] * l->to.y + s->w[k];
+            double at = from / (from - to);
+            double enters = from < 0.0 ? to < 0.0 ? 2.0 : at : 0.0;
+            double leaves = to < 0.0 ? from < 0.0 ? -1.0 : at : 1.0;
+            low[k] = enters > low[k] ? enters : low[k];
+            high[k] = leaves < high[k] ? leaves : high[k];
         }
-        for (int k = 0; k < BST_HALF_PLANES && out; k++) {
-            keep(l, at_from[k], at_to[k]);
-        }
+    }
+    for (int k = 0; k < BST_HALF_PLANES; k++) {
+        l->low = greater_of(l->low, low[k]);
+        l->high = lesser_of(l->high, high[k]);
     }
 }
 
 /* Coordinates of a vector of the view in which the circles of a band are round. */
-static bst_point2 in_band(const bst_round_band *b, double x, double y) {
+BST_INLINED bst_point2 in_band(const bst_round_band *b, double x, double y) {
     return (bst_point2){(x * b->along.x + y * b->along.y) * b->scale,
                         y * b->along.x - x * b->along.y};
 }
 
 /* Extends an interval to what a line has in a circle about the origin. */
-static void add_circle(bst_point2 from, bst_point2 step, double radius, line_view *l) {
+BST_INLINED void add_circle(bst_point2 from, bst_point2 step, double radius, line_view *l) {
     double a = step.x * step.x + step.y * step.y, b = from.x * step.x + from.y * step.y;
     double c = from.x * from.x + from.y * from.y - radius * radius, root = b * b - a * c;
     if (root > 0.0 && a > 0.0) {
@@ -110,7 +120,7 @@ static void add_circle(bst_point2 from, bst_point2 step, double radius, line_vie
 }
 
 /* Keeps what is within a round body: bands whose hulls together are convex. */
-static void keep_within_bands(line_view *l, const bst_round_band *bands, int count) {
+BST_INLINED void keep_within_bands(line_view *l, const bst_round_band *bands, int count) {
     line_view all = {.low = 1.0, .high = 0.0};
     for (int i = 0; i < count; i++) {
         const bst_round_band *b = &bands[i];
@@ -221,7 +231,7 @@ static bst_round_band rim_of(const bst_satellite_pose *p, const bst_pose_view *v
 }
 
 /* Takes what light cannot leave through the rim of a shell. */
-static void take_beside_rim(const bst_round_band *rim, line_view *l, spans *free) {
+BST_INLINED void take_beside_rim(const bst_round_band *rim, line_view *l, spans *free) {
     if (rim->radius_m[0] > 0.0) {
         keep_within_bands(l, rim, 1);
     }
@@ -240,7 +250,7 @@ static bool is_inside(const bst_satellite_pose *p, const bst_light_line *l,
 }
 
 /* Keeps what is within the silhouette of a hider. */
-static void keep_within_silhouette(const bst_line_shadow *w, int view, const int hider[2],
+BST_INLINED void keep_within_silhouette(const bst_line_shadow *w, int view, const int hider[2],
                                    line_view *l) {
     if (hider[1] >= 0) {
         keep_within_bands(l, w->bands + hider[1], bands_of(w->pose, hider[0]));
@@ -254,14 +264,14 @@ static void keep_within_silhouette(const bst_line_shadow *w, int view, const int
 
 /* True if a line or surface is beside a body or in front of it, by the bounds of both. Round bodies
  * may reach beyond those of their vertices by 0.3 % of their size, with 24 facets around. */
-static bool is_beside(const double own[6], const double b[6]) {
+BST_INLINED bool is_beside(const double own[6], const double b[6]) {
     double x = 0.02 * (b[1] - b[0]), y = 0.02 * (b[3] - b[2]);
     return (own[1] < b[0] - x) | (own[0] > b[1] + x) | (own[3] < b[2] - y) | (own[2] > b[3] + y) |
            (own[4] >= b[5]);
 }
 
 /* Takes what a body hides of a line in a view. */
-static void take_hidden(const bst_line_shadow *w, int view, const int hider[2],
+BST_INLINED void take_hidden(const bst_line_shadow *w, int view, const int hider[2],
                         const bst_light_line *of, const line_view *all, spans *free) {
     bst_satellite_pose *p = w->pose;
     const bst_satellite *s = p->satellite;
@@ -314,6 +324,20 @@ static void add_ring(const bst_pose_view *v, const bst_line_ring *ring, double b
     }
 }
 
+/* True if all light of a surface between coaxial rings leaves through the rim of its shell. */
+static bool is_within_rim(const bst_satellite_pose *p, const bst_pose_view *v, int index,
+                          const bst_line_ring *rings, int count) {
+    bst_pose_rim rim = bst_pose_rim_of(p, v, index);
+    bool within = rim.rate > 0.0;
+    for (int i = 0; i < count && within; i++) {
+        bst_vec3 r = bst_vec3_sub(rings[i].centre, rim.centre);
+        r = bst_vec3_axpy(r, -bst_vec3_dot(r, rim.axis) / rim.rate, v->z);
+        double reach = bst_vec3_norm(r) + rings[i].radius_m;
+        within = reach <= (1.0 + 1e-12) * p->satellite->shells[index].radius_m;
+    }
+    return within;
+}
+
 bool bst_line_shadow_make(bst_satellite_pose *p, int body, bool inside, const bst_line_ring *rings,
                           int ring_count, bst_line_shadow *w) {
     int n = 0, occluders = p->satellite->occluder_count;
@@ -324,16 +348,19 @@ bool bst_line_shadow_make(bst_satellite_pose *p, int body, bool inside, const bs
     for (int k = 0; k < 2; k++) {
         const bst_pose_view *v = &p->views[k];
         double bounds[6];
+        bool own = inside;
         w->first[k] = n;
         bst_pose_start_bounds(bounds);
         if (inside) {
-            w->rim[k] = rim_of(p, v, p->satellite->occluders[body].shell);
+            int shell = p->satellite->occluders[body].shell;
+            w->rim[k] = rim_of(p, v, shell);
+            own = !is_within_rim(p, v, shell, rings, ring_count);
         }
         for (int i = 0; i < ring_count; i++) {
             add_ring(v, &rings[i], bounds);
         }
         for (int o = 0; o < occluders; o++) {
-            bool may = o == body ? inside : !few || (v->hiders[body] >> o & 1);
+            bool may = o == body ? own : !few || (v->hiders[body] >> o & 1);
             if (may && (o == body || !is_beside(bounds, v->bounds[o]))) {
                 p->hiders[n][0] = o;
                 p->hiders[n++][1] = o == body ? -1 : add_bands(w, v, o);

@@ -2,10 +2,10 @@
 
 #include "sim/satellite/curved_light.h"
 #include "sim/satellite/line_shadow.h"
+#include "sim/satellite/pose_view.h"
 
 enum {
     PLACES_MAX = 64,
-    BREAKS_MAX = PLACES_MAX + 16,
     CHORDS = 16,
     FEW_CORNERS = 8,
     HIDER_CORNERS = 40,
@@ -17,7 +17,9 @@ enum {
 enum { SIDES_MAX = 7 };
 
 /* Widest panel of azimuth before it is halved, rad. */
-static const double PANEL_RAD = 0.35;
+static const double PANEL_RAD = 0.7;
+static const double ERROR = 0.4;
+static const double NEAR = 0.3, WIDEN = 2.0;
 /* Tolerance below which panels are not wider than that, and above which the corners of hiders do
  * not matter. */
 static const double FINE = 6e-4, COARSE = 2e-2;
@@ -37,7 +39,7 @@ typedef struct surface {
     double radius_m;               /* of a disc */
     bst_point2 corner[SIDES_MAX];  /* of a polygon */
     int corners;
-    double tolerance;         /* of one panel, in the unit of the integral */
+    double tolerance, share;  /* of one panel, in the unit of the integral; of the whole */
     double narrow;            /* no shadow is sought within panels that are narrower */
     double place[PLACES_MAX]; /* of the corners of hiders */
     int places;
@@ -137,42 +139,32 @@ static light light_at(const surface *w, double place) {
     return sum;
 }
 
-/* Adds a panel by two-point Gauss quadrature. Returned: its difference from the rule of the middle.
- */
+/* Adds a panel by three-point Gauss quadrature. Returned: its difference from the rule of the
+ * middle, times ERROR. */
 static double add_panel(const surface *w, double from, double to, int halvings, light *sum) {
-    double half = 0.5 * (to - from), middle = from + half;
-    light a = light_at(w, middle - half / sqrt(3.0)), b = light_at(w, middle + half / sqrt(3.0));
-    bool none = !(a.lost > 0.0 || b.lost > 0.0), all = a.lost >= a.all && b.lost >= b.all;
-    double error = 0.0;
-    if (!none && !all) {
-        error = half * fabs(a.lost + b.lost - 2.0 * light_at(w, middle).lost);
-    }
+    double half = 0.5 * (to - from), middle = from + half, aside = half * sqrt(0.6);
+    light a = light_at(w, middle - aside), m = light_at(w, middle), b = light_at(w, middle + aside);
+    bool none = !(a.lost > 0.0 || b.lost > 0.0 || m.lost > 0.0);
+    bool all = a.lost >= a.all && b.lost >= b.all && m.lost >= m.all;
+    
+    double error = none || all ? 0.0 : ERROR * half * fabs(a.lost + b.lost - 2.0 * m.lost);
     if ((error > w->tolerance || ((none || all) && to - from > w->narrow)) && halvings > 0) {
         return add_panel(w, from, middle, halvings - 1, sum) +
                add_panel(w, middle, to, halvings - 1, sum);
     }
-    sum->all += half * (a.all + b.all);
-    sum->lost += half * (none ? 0.0 : all ? a.all + b.all : a.lost + b.lost);
+    double whole = half / 9.0 * (5.0 * (a.all + b.all) + 8.0 * m.all);
+    sum->all += whole;
+    sum->lost += none ? 0.0 : all ? whole : half / 9.0 * (5.0 * (a.lost + b.lost) + 8.0 * m.lost);
     return error;
 }
 
-/* Borders of panels. */
-typedef struct breaks {
-    double at[BREAKS_MAX];
-    int count;
-} breaks;
-
-static void add_break(breaks *b, double x) {
-    if (b->count < BREAKS_MAX) {
-        b->at[b->count++] = x;
-    }
-}
-
-/* Azimuths where a ray of a view meets a curved surface, which is continued beyond its ends.
+/* Azimuths where a ray of a view meets a curved surface; a cone is continued beyond its ends if
+ * `beyond`.
  *
  * Given:     r  a point of the ray, from the base
  * Returned:  their number */
-static int meet_curved(const surface *w, const bst_pose_view *v, bst_vec3 r, double place[2]) {
+static int meet_curved(const surface *w, const bst_pose_view *v, bst_vec3 r, bool beyond,
+                       double place[2]) {
     const bst_curved *c = w->curved;
     double k = c->sphere ? 0.0 : (c->top_radius_m - c->radius_m) / c->length_m;
     double rx = bst_vec3_dot(r, w->x), ry = bst_vec3_dot(r, w->y), rz = bst_vec3_dot(r, w->z);
@@ -193,22 +185,30 @@ static int meet_curved(const surface *w, const bst_pose_view *v, bst_vec3 r, dou
             continue;
         }
         double t = (-b + side * sqrt(root)) / a;
-        place[n++] = atan2(ry + t * dy, rx + t * dx);
+        double height = rz + t * dz;
+        if (beyond || c->sphere || (height >= 0.0 && height <= c->length_m)) {
+            place[n++] = atan2(ry + t * dy, rx + t * dx);
+        }
     }
     return n;
 }
 
+/* The same azimuth, from `start` on. */
+static double turned_to(double azimuth, double start) {
+    double turn = azimuth - start;
+    return start + turn - 2.0 * BST_PI * floor(turn / (2.0 * BST_PI));
+}
+
 /* Places, from `start` on, where the ray of a view through a point of its plane meets the surface
  * or its continuation. Returned: their number. */
-static int meet(const surface *w, const bst_pose_view *v, bst_point2 point, double start,
-                double place[2]) {
+static int meet(const surface *w, const bst_pose_view *v, bst_point2 point, bool beyond,
+                double start, double place[2]) {
     bst_vec3 q = bst_vec3_axpy(bst_vec3_scale(v->x, point.x), point.y, v->y);
     bst_vec3 r = bst_vec3_sub(q, w->base);
     if (w->curved) {
-        int n = meet_curved(w, v, r, place);
+        int n = meet_curved(w, v, r, beyond, place);
         for (int i = 0; i < n; i++) {
-            double turn = place[i] - start;
-            place[i] = start + turn - 2.0 * BST_PI * floor(turn / (2.0 * BST_PI));
+            place[i] = turned_to(place[i], start);
         }
         return n;
     }
@@ -227,24 +227,84 @@ static void add_place(surface *w, double place) {
     }
 }
 
-/* Adds the places of a hider's corners; of those with many corners the outermost ones. */
-static void add_corners(surface *w, int view, int hider, double start, double end) {
-    bst_point2 corner[HIDER_CORNERS];
-    int count = bst_line_shadow_corners(&w->shadow, view, hider, HIDER_CORNERS, corner);
-    double low = INFINITY, high = -INFINITY, place[2];
-    for (int n = 0; n < count; n++) {
-        int found = meet(w, &w->shadow.pose->views[view], corner[n], start, place);
-        for (int m = 0; m < found; m++) {
-            if (place[m] > start && place[m] < end) {
-                low = fmin(low, place[m]);
-                high = fmax(high, place[m]);
-                if (count <= FEW_CORNERS) {
-                    add_place(w, place[m]);
+/* Adds the azimuths between two where an end of a cone crosses an edge of a silhouette. */
+static void add_crossings(surface *w, const bst_pose_view *v, bst_point2 p, bst_point2 q,
+                          double start, double end) {
+    bst_point2 d = {q.x - p.x, q.y - p.y};
+    double length2 = d.x * d.x + d.y * d.y;
+    double xx = bst_vec3_dot(w->x, v->x), xy = bst_vec3_dot(w->x, v->y);
+    double yx = bst_vec3_dot(w->y, v->x), yy = bst_vec3_dot(w->y, v->y);
+    for (int i = 0; i < 2; i++) {
+        double radius = i == 0 ? w->curved->radius_m : w->curved->top_radius_m;
+        bst_vec3 centre = bst_vec3_axpy(w->base, i * w->curved->length_m, w->z);
+        double x = bst_vec3_dot(centre, v->x) - p.x, y = bst_vec3_dot(centre, v->y) - p.y;
+        double a = radius * (d.x * xy - d.y * xx), b = radius * (d.x * yy - d.y * yx);
+        double c = d.x * y - d.y * x, height2 = a * a + b * b, root = height2 - c * c;
+        for (int side = -1; side <= 1 && root > 0.0; side += 2) {
+            double s = side * sqrt(root);
+            double cosine = (-a * c - b * s) / height2, sine = (-b * c + a * s) / height2;
+            double along = d.x * (x + radius * (cosine * xx + sine * yx)) +
+                           d.y * (y + radius * (cosine * xy + sine * yy));
+            if (along > 0.0 && along < length2) {
+                double place = turned_to(atan2(sine, cosine), start);
+                if (place < end) {
+                    add_place(w, place);
                 }
             }
         }
     }
-    if (count > FEW_CORNERS && low <= high) {
+}
+
+/* Adds the azimuths between two where the shadow of a shell's rim crosses an end of a band within
+ * it: circles in the plane of the rim, along the view. */
+static void add_rim_crossings(surface *w, const bst_pose_view *v, double start, double end) {
+    const bst_satellite_pose *p = w->shadow.pose;
+    int shell = p->satellite->occluders[w->curved->occluder].shell;
+    double radius = p->satellite->shells[shell].radius_m, lower = 0.0, middle = 0.0;
+    bst_pose_rim rim = bst_pose_rim_of(p, v, shell);
+    for (int i = 0; i < 2; i++) {
+        double ring = i == 0 ? w->curved->radius_m : w->curved->top_radius_m;
+        bst_vec3 r =
+            bst_vec3_sub(bst_vec3_axpy(w->base, i * w->curved->length_m, w->z), rim.centre);
+        r = bst_vec3_axpy(r, -bst_vec3_dot(r, rim.axis) / rim.rate, v->z);
+        double moved = bst_vec3_norm(r);
+        bool same = i == 1 && moved <= 1e-9 * radius; /* the rim itself: the limit from below */
+        double cosine = same ? (radius - w->curved->radius_m) / lower
+                             : (radius * radius - ring * ring - moved * moved) / (2.0 * ring * moved);
+        middle = same ? middle : atan2(bst_vec3_dot(r, w->y), bst_vec3_dot(r, w->x));
+        lower = moved;
+        for (int side = -1; side <= 1 && fabs(cosine) < 1.0; side += 2) {
+            double place = turned_to(middle + side * acos(cosine), start);
+            if (place < end) {
+                add_place(w, place);
+            }
+        }
+    }
+}
+
+/* Adds the places of a hider's corners; of those with many corners the outermost ones. */
+static void add_corners(surface *w, int view, int hider, double start, double end) {
+    bst_point2 corner[HIDER_CORNERS];
+    const bst_pose_view *v = &w->shadow.pose->views[view];
+    int count = bst_line_shadow_corners(&w->shadow, view, hider, HIDER_CORNERS, corner);
+    bool few = count <= FEW_CORNERS;
+    double low = INFINITY, high = -INFINITY, place[2];
+    for (int n = 0; n < count; n++) {
+        int found = meet(w, v, corner[n], !few, start, place);
+        for (int m = 0; m < found; m++) {
+            if (place[m] > start && place[m] < end) {
+                low = fmin(low, place[m]);
+                high = fmax(high, place[m]);
+                if (few) {
+                    add_place(w, place[m]);
+                }
+            }
+        }
+        if (few && w->curved && !w->curved->sphere) {
+            add_crossings(w, v, corner[n], corner[n + 1 < count ? n + 1 : 0], start, end);
+        }
+    }
+    if (!few && low <= high) {
         add_place(w, low);
         add_place(w, high);
     }
@@ -253,29 +313,32 @@ static void add_corners(surface *w, int view, int hider, double start, double en
 static void add_all_corners(surface *w, double start, double end) {
     for (int k = 0; k < 2; k++) {
         for (int i = w->shadow.first[k]; i < w->shadow.first[k + 1]; i++) {
-            add_corners(w, k, i, start, end);
+            if (w->curved && w->shadow.pose->hiders[i][0] == w->curved->occluder) {
+                add_rim_crossings(w, &w->shadow.pose->views[k], start, end);
+            } else {
+                add_corners(w, k, i, start, end);
+            }
         }
     }
+    bst_sort_few(w->place, w->places);
 }
 
 /* Adds the integral between two places, in panels no wider than `widest`. Returned: its error. */
 static double add_range(const surface *w, double from, double to, double widest, light *sum) {
-    breaks b = {{from, to}, 2};
-    double error = 0.0;
-    int parts = (int)ceil((to - from) / widest);
-    for (int n = 1; n < parts; n++) {
-        add_break(&b, from + (to - from) * n / parts);
-    }
-    for (int n = 0; n < w->places; n++) {
-        if (w->place[n] > from && w->place[n] < to) {
-            add_break(&b, w->place[n]);
+    double error = 0.0, start = from, gap = fmin(NEAR * w->share, 0.02) * (to - from);
+    for (int n = 0; n <= w->places && start < to; n++) {
+        double end = n < w->places ? w->place[n] : to;
+        if (end >= to || to - end < gap) {
+            end = to;
+        } else if (end - start < gap) {
+            continue; /* what a jump changes within it is little */
         }
-    }
-    bst_sort_few(b.at, b.count);
-    for (int n = 0; n + 1 < b.count; n++) {
-        if (b.at[n + 1] - b.at[n] > 1e-9 * (to - from)) {
-            error += add_panel(w, b.at[n], b.at[n + 1], HALVINGS, sum);
+        int parts = (int)ceil((end - start) / widest);
+        for (int i = 0; i < parts; i++) {
+            error += add_panel(w, start + (end - start) * i / parts,
+                               start + (end - start) * (i + 1) / parts, HALVINGS, sum);
         }
+        start = end;
     }
     return error;
 }
@@ -347,8 +410,9 @@ double bst_curved_free_share(bst_satellite_pose *p, int curved, double light_m2,
         observer = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], observer);
     }
     int panels = bst_curved_panels(c, w.brdf, sun, observer, panel);
+    w.share = tolerance;
     w.tolerance = tolerance * light_m2;
-    double width = PANEL_RAD * fmin(fmax(cbrt(tolerance / FINE), 1.0), 2.0);
+    double width = PANEL_RAD * fmin(fmax(cbrt(tolerance / FINE), 1.0), WIDEN);
     w.narrow = 1.01 * width;
     if (panels > 0 && tolerance < COARSE) {
         add_all_corners(&w, panel[0][0], panel[panels - 1][1]);
@@ -411,6 +475,7 @@ double bst_plane_free_share(bst_satellite_pose *p, int index, double tolerance, 
     if (!bst_line_shadow_make(p, f->occluder, f->inside, rings, disc ? 1 : f->count, &w.shadow)) {
         return 1.0;
     }
+    w.share = tolerance;
     w.tolerance = tolerance * f->area_m2;
     w.narrow = 0.5 * (high - low) / PLANE_PANELS;
     add_all_corners(&w, low, high);
