@@ -434,3 +434,19 @@ int bst_line_shadow_corners(const bst_line_shadow *w, int view, int index, int r
     }
     return n;
 }
+
+bool bst_line_shadow_tangents(const bst_line_shadow *w, int index, bst_point2 tangent[2][2]) {
+    const int *hider = w->pose->hiders[index];
+    if (hider[1] < 0) {
+        return false;
+    }
+    const bst_round_band *b = &w->bands[hider[1] + bands_of(w->pose, hider[0]) - 1];
+    for (int k = 0; k < 4 && b->tangents; k++) {
+        double r = b->radius_m[k % 2], across = (k < 2 ? r : -r) * b->cosine;
+        double along = (k % 2 * b->apart + r * b->sine) / b->scale;
+        tangent[k / 2][k % 2] =
+            (bst_point2){b->centre.x + along * b->along.x - across * b->along.y,
+                         b->centre.y + along * b->along.y + across * b->along.x};
+    }
+    return b->tangents;
+}

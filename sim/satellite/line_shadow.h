@@ -62,4 +62,11 @@ double bst_line_shadow_lost(const bst_line_shadow *shadow, const bst_light_line 
 int bst_line_shadow_corners(const bst_line_shadow *shadow, int view, int index, int room,
                             bst_point2 *point);
 
+/* The two straight sides of a round hider's silhouette.
+ *
+ * Given:     index  of the list
+ * Returned:  tangent  the ends of each, along the view's x and y
+ *            false: it has none, or the hider is not round */
+bool bst_line_shadow_tangents(const bst_line_shadow *shadow, int index, bst_point2 tangent[2][2]);
+
 #endif

@@ -304,6 +304,12 @@ static void add_corners(surface *w, int view, int hider, double start, double en
             add_crossings(w, v, corner[n], corner[n + 1 < count ? n + 1 : 0], start, end);
         }
     }
+    bst_point2 tangent[2][2];
+    if (w->curved && !w->curved->sphere &&
+        bst_line_shadow_tangents(&w->shadow, hider, tangent)) {
+        add_crossings(w, v, tangent[0][0], tangent[0][1], start, end);
+        add_crossings(w, v, tangent[1][0], tangent[1][1], start, end);
+    }
     if (!few && low <= high) {
         add_place(w, low);
         add_place(w, high);
