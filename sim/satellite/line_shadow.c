@@ -7,7 +7,6 @@
 
 enum { SPANS_MAX = 32 };
 
-
 /* Least cosine between the axis of a ring and the view: its ellipse is this thin at most. */
 static const double EDGE_ON = 1e-6;
 
@@ -251,7 +250,7 @@ static bool is_inside(const bst_satellite_pose *p, const bst_light_line *l,
 
 /* Keeps what is within the silhouette of a hider. */
 BST_INLINED void keep_within_silhouette(const bst_line_shadow *w, int view, const int hider[2],
-                                   line_view *l) {
+                                        line_view *l) {
     if (hider[1] >= 0) {
         keep_within_bands(l, w->bands + hider[1], bands_of(w->pose, hider[0]));
         return;
@@ -272,7 +271,7 @@ BST_INLINED bool is_beside(const double own[6], const double b[6]) {
 
 /* Takes what a body hides of a line in a view. */
 BST_INLINED void take_hidden(const bst_line_shadow *w, int view, const int hider[2],
-                        const bst_light_line *of, const line_view *all, spans *free) {
+                             const bst_light_line *of, const line_view *all, spans *free) {
     bst_satellite_pose *p = w->pose;
     const bst_satellite *s = p->satellite;
     const bst_pose_view *v = &p->views[view];

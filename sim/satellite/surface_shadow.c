@@ -5,7 +5,7 @@
 #include "sim/satellite/pose_view.h"
 
 enum {
-    PLACES_MAX = 64,
+    PLACES_MAX = 160,
     CHORDS = 16,
     FEW_CORNERS = 8,
     HIDER_CORNERS = 40,
@@ -18,8 +18,13 @@ enum { SIDES_MAX = 7 };
 
 /* Widest panel of azimuth before it is halved, rad. */
 static const double PANEL_RAD = 0.7;
+/* Error of a panel over its difference from the rule of the middle: assumed, and above what was
+ * found in 900 views of six models. */
 static const double ERROR = 0.4;
-static const double NEAR = 0.3, WIDEN = 2.0;
+/* Borders nearer than this times the tolerance are one. */
+static const double NEAR = 0.3;
+/* Panels of surfaces that matter little are up to this wider. */
+static const double WIDEN = 2.0;
 /* Tolerance below which panels are not wider than that, and above which the corners of hiders do
  * not matter. */
 static const double FINE = 6e-4, COARSE = 2e-2;
@@ -146,7 +151,7 @@ static double add_panel(const surface *w, double from, double to, int halvings, 
     light a = light_at(w, middle - aside), m = light_at(w, middle), b = light_at(w, middle + aside);
     bool none = !(a.lost > 0.0 || b.lost > 0.0 || m.lost > 0.0);
     bool all = a.lost >= a.all && b.lost >= b.all && m.lost >= m.all;
-    
+
     double error = none || all ? 0.0 : ERROR * half * fabs(a.lost + b.lost - 2.0 * m.lost);
     if ((error > w->tolerance || ((none || all) && to - from > w->narrow)) && halvings > 0) {
         return add_panel(w, from, middle, halvings - 1, sum) +
@@ -269,8 +274,9 @@ static void add_rim_crossings(surface *w, const bst_pose_view *v, double start, 
         r = bst_vec3_axpy(r, -bst_vec3_dot(r, rim.axis) / rim.rate, v->z);
         double moved = bst_vec3_norm(r);
         bool same = i == 1 && moved <= 1e-9 * radius; /* the rim itself: the limit from below */
-        double cosine = same ? (radius - w->curved->radius_m) / lower
-                             : (radius * radius - ring * ring - moved * moved) / (2.0 * ring * moved);
+        double cosine =
+            same ? (radius - w->curved->radius_m) / lower
+                 : (radius * radius - ring * ring - moved * moved) / (2.0 * ring * moved);
         middle = same ? middle : atan2(bst_vec3_dot(r, w->y), bst_vec3_dot(r, w->x));
         lower = moved;
         for (int side = -1; side <= 1 && fabs(cosine) < 1.0; side += 2) {
@@ -305,10 +311,15 @@ static void add_corners(surface *w, int view, int hider, double start, double en
         }
     }
     bst_point2 tangent[2][2];
-    if (w->curved && !w->curved->sphere &&
-        bst_line_shadow_tangents(&w->shadow, hider, tangent)) {
-        add_crossings(w, v, tangent[0][0], tangent[0][1], start, end);
-        add_crossings(w, v, tangent[1][0], tangent[1][1], start, end);
+    bool straight = bst_line_shadow_tangents(&w->shadow, hider, tangent);
+    for (int i = 0; i < 4 && straight; i++) {
+        if (!w->curved && meet(w, v, tangent[i / 2][i % 2], false, start, place) > 0 &&
+            place[0] > start && place[0] < end) {
+            add_place(w, place[0]);
+        }
+        if (w->curved && !w->curved->sphere && i % 2 == 0) {
+            add_crossings(w, v, tangent[i / 2][0], tangent[i / 2][1], start, end);
+        }
     }
     if (!few && low <= high) {
         add_place(w, low);
