@@ -5,7 +5,7 @@
 #include "sim/satellite/pose_view.h"
 
 enum {
-    PLACES_MAX = 160,
+    PLACES_MAX = 64,
     CHORDS = 16,
     FEW_CORNERS = 8,
     HIDER_CORNERS = 40,
@@ -131,10 +131,12 @@ static bst_light_line polygon_line(const surface *w, double y, int index) {
 /* Light at one place, or the integral over places. */
 typedef struct light {
     double all, lost;
+    double place;               /* last one of the last panel; of a sum only */
+    double share, slope, end; /* lost there, its slope, and the panel's end */
 } light;
 
 static light light_at(const surface *w, double place) {
-    light sum = {0.0, 0.0};
+    light sum = {.all = 0.0};
     for (int i = 0; i < w->lines; i++) {
         bst_light_line l = w->line(w, place, i);
         double all = 0.5 * (l.from_weight + l.to_weight);
@@ -142,6 +144,35 @@ static light light_at(const surface *w, double place) {
         sum.lost += all > 0.0 ? bst_line_shadow_lost(&w->shadow, &l) : 0.0;
     }
     return sum;
+}
+
+static double lost_share(const light *l) {
+    return l->all > 0.0 ? fmin(l->lost / l->all, 1.0) : 0.0;
+}
+
+/* Corrects the integral where a shadow begins or ends at once, beside the border of two panels and
+ * not at it: the place is found by halving. Returned: the error that is left.
+ *
+ * Given:     from, first  the border, and the share that is lost at the first place after it
+ *            slope        of the share there
+ *            density      light by place */
+static double mend_jump(const surface *w, double from, double first_place, double first,
+                        double slope, double density, light *sum) {
+    double low = sum->place, high = first_place, way = high - low, jump = first - sum->share;
+    double expected = way * fmax(fabs(slope), fabs(sum->slope));
+    double error = density * way * (fabs(jump) - 2.0 * expected);
+    if (sum->end != from || !(error > w->tolerance)) {
+        return 0.0;
+    }
+    for (; error > 0.5 * w->tolerance && high - low > 1e-6 * way; error *= 0.5) {
+        double middle = 0.5 * (low + high);
+        light at = light_at(w, middle);
+        bool before = fabs(lost_share(&at) - sum->share) < fabs(lost_share(&at) - first);
+        low = before ? middle : low;
+        high = before ? high : middle;
+    }
+    sum->lost += density * jump * (from - 0.5 * (low + high));
+    return error;
 }
 
 /* Adds a panel by three-point Gauss quadrature. Returned: its difference from the rule of the
@@ -157,6 +188,12 @@ static double add_panel(const surface *w, double from, double to, int halvings, 
         return add_panel(w, from, middle, halvings - 1, sum) +
                add_panel(w, middle, to, halvings - 1, sum);
     }
+    double share = lost_share(&a), last = lost_share(&b), slope = 0.5 * (last - share) / aside;
+    error += mend_jump(w, from, middle - aside, share, slope, fmax(a.all, b.all), sum);
+    sum->place = middle + aside;
+    sum->share = last;
+    sum->slope = slope;
+    sum->end = to;
     double whole = half / 9.0 * (5.0 * (a.all + b.all) + 8.0 * m.all);
     sum->all += whole;
     sum->lost += none ? 0.0 : all ? whole : half / 9.0 * (5.0 * (a.lost + b.lost) + 8.0 * m.lost);
@@ -406,7 +443,7 @@ double bst_curved_free_share(bst_satellite_pose *p, int curved, double light_m2,
                  .observer = p->views[0].z,
                  .sun = p->views[1].z};
     double panel[BST_CURVED_PANELS_MAX][2];
-    light sum = {0.0, 0.0};
+    light sum = {.end = NAN};
     *error = 0.0;
     place_curved(p, &w);
     bst_line_ring rings[2] = {{w.base, w.z, c->radius_m},
@@ -465,7 +502,7 @@ double bst_plane_free_share(bst_satellite_pose *p, int index, double tolerance, 
     bool disc = f->count > SIDES_MAX;
     surface w = {.line = disc ? disc_line : polygon_line, .lines = 1, .z = p->normals[index]};
     double low = INFINITY, high = -INFINITY;
-    light sum = {0.0, 0.0};
+    light sum = {.end = NAN};
     *error = 0.0;
     bst_line_ring rings[SIDES_MAX];
     w.base = p->vertices[corner[0]];
