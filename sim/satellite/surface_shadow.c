@@ -18,8 +18,8 @@ enum { SIDES_MAX = 7 };
 
 /* Widest panel of azimuth before it is halved, rad. */
 static const double PANEL_RAD = 0.7;
-/* Error of a panel over its difference from the rule of the middle: assumed, and above what was
- * found in 900 views of six models. */
+/* Error of a panel over its difference from the rule of the middle: a choice, see
+ * docs/results/satellites.md. */
 static const double ERROR = 0.4;
 /* Borders nearer than this times the tolerance are one. */
 static const double NEAR = 0.3;
@@ -131,7 +131,7 @@ static bst_light_line polygon_line(const surface *w, double y, int index) {
 /* Light at one place, or the integral over places. */
 typedef struct light {
     double all, lost;
-    double place;               /* last one of the last panel; of a sum only */
+    double place;             /* last one of the last panel; of a sum only */
     double share, slope, end; /* lost there, its slope, and the panel's end */
 } light;
 

@@ -17,9 +17,10 @@
  *            *error  estimate of the error of the share
  * Notes:     integrated over the round surface itself, along lines of its axis for cylinders and
  *            cones, and along chords of meridians for spheres: bst_line_shadow_lost. Over azimuth,
- *            two-point Gauss quadrature in panels between the azimuths of the hiders' corners,
- *            halved until the halves agree with the whole; the error is the sum of what they still
- *            differ by. */
+ *            three-point Gauss quadrature in panels between the azimuths where silhouettes cross
+ *            the ends of the surface or have corners on it, halved until it agrees with the rule
+ *            of the middle; where a shadow begins at once its place is found by halving. The error
+ *            is the sum of what the rules still differ by, and of what jumps may be off. */
 double bst_curved_free_share(bst_satellite_pose *pose, int curved, double light_m2,
                              double tolerance, double *error);
 
