@@ -25,7 +25,7 @@ typedef struct line_view {
 
 /* Removes [low, high] from the free parts; the smaller part of a free one too where there is no
  * room for both. */
-BST_INLINED void take(spans *s, double low, double high) {
+static BST_INLINED void take(spans *s, double low, double high) {
     int kept = 0, count = s->count;
     for (int i = 0; i < count; i++) {
         double from = s->from[i], to = s->to[i];
@@ -51,16 +51,16 @@ BST_INLINED void take(spans *s, double low, double high) {
     s->count = kept;
 }
 
-BST_INLINED double greater_of(double a, double b) {
+static BST_INLINED double greater_of(double a, double b) {
     return a > b ? a : b;
 }
 
-BST_INLINED double lesser_of(double a, double b) {
+static BST_INLINED double lesser_of(double a, double b) {
     return a < b ? a : b;
 }
 
 /* Keeps the part of the interval where a linear function is not below 0, given at the ends. */
-BST_INLINED void keep(line_view *l, double at_from, double at_to) {
+static BST_INLINED void keep(line_view *l, double at_from, double at_to) {
     if (at_from < 0.0 && at_to < 0.0) {
         l->high = -1.0;
     } else if (at_from < 0.0) {
@@ -71,7 +71,7 @@ BST_INLINED void keep(line_view *l, double at_from, double at_to) {
 }
 
 /* Keeps what is within a convex polygon of the view: without branches, for wide registers. */
-BST_INLINED void keep_within(line_view *l, const bst_half_planes *sides, int blocks) {
+static BST_INLINED void keep_within(line_view *l, const bst_half_planes *sides, int blocks) {
     double low[BST_HALF_PLANES], high[BST_HALF_PLANES];
     for (int k = 0; k < BST_HALF_PLANES; k++) {
         low[k] = l->low;
@@ -96,13 +96,13 @@ BST_INLINED void keep_within(line_view *l, const bst_half_planes *sides, int blo
 }
 
 /* Coordinates of a vector of the view in which the circles of a band are round. */
-BST_INLINED bst_point2 in_band(const bst_round_band *b, double x, double y) {
+static BST_INLINED bst_point2 in_band(const bst_round_band *b, double x, double y) {
     return (bst_point2){(x * b->along.x + y * b->along.y) * b->scale,
                         y * b->along.x - x * b->along.y};
 }
 
 /* Extends an interval to what a line has in a circle about the origin. */
-BST_INLINED void add_circle(bst_point2 from, bst_point2 step, double radius, line_view *l) {
+static BST_INLINED void add_circle(bst_point2 from, bst_point2 step, double radius, line_view *l) {
     double a = step.x * step.x + step.y * step.y, b = from.x * step.x + from.y * step.y;
     double c = from.x * from.x + from.y * from.y - radius * radius, root = b * b - a * c;
     if (root > 0.0 && a > 0.0) {
@@ -119,7 +119,7 @@ BST_INLINED void add_circle(bst_point2 from, bst_point2 step, double radius, lin
 }
 
 /* Keeps what is within a round body: bands whose hulls together are convex. */
-BST_INLINED void keep_within_bands(line_view *l, const bst_round_band *bands, int count) {
+static BST_INLINED void keep_within_bands(line_view *l, const bst_round_band *bands, int count) {
     line_view all = {.low = 1.0, .high = 0.0};
     for (int i = 0; i < count; i++) {
         const bst_round_band *b = &bands[i];
@@ -230,7 +230,7 @@ static bst_round_band rim_of(const bst_satellite_pose *p, const bst_pose_view *v
 }
 
 /* Takes what light cannot leave through the rim of a shell. */
-BST_INLINED void take_beside_rim(const bst_round_band *rim, line_view *l, spans *free) {
+static BST_INLINED void take_beside_rim(const bst_round_band *rim, line_view *l, spans *free) {
     if (rim->radius_m[0] > 0.0) {
         keep_within_bands(l, rim, 1);
     }
@@ -249,8 +249,8 @@ static bool is_inside(const bst_satellite_pose *p, const bst_light_line *l,
 }
 
 /* Keeps what is within the silhouette of a hider. */
-BST_INLINED void keep_within_silhouette(const bst_line_shadow *w, int view, const int hider[2],
-                                        line_view *l) {
+static BST_INLINED void keep_within_silhouette(const bst_line_shadow *w, int view,
+                                               const int hider[2], line_view *l) {
     if (hider[1] >= 0) {
         keep_within_bands(l, w->bands + hider[1], bands_of(w->pose, hider[0]));
         return;
@@ -263,15 +263,15 @@ BST_INLINED void keep_within_silhouette(const bst_line_shadow *w, int view, cons
 
 /* True if a line or surface is beside a body or in front of it, by the bounds of both. Round bodies
  * may reach beyond those of their vertices by 0.3 % of their size, with 24 facets around. */
-BST_INLINED bool is_beside(const double own[6], const double b[6]) {
+static BST_INLINED bool is_beside(const double own[6], const double b[6]) {
     double x = 0.02 * (b[1] - b[0]), y = 0.02 * (b[3] - b[2]);
     return (own[1] < b[0] - x) | (own[0] > b[1] + x) | (own[3] < b[2] - y) | (own[2] > b[3] + y) |
            (own[4] >= b[5]);
 }
 
 /* Takes what a body hides of a line in a view. */
-BST_INLINED void take_hidden(const bst_line_shadow *w, int view, const int hider[2],
-                             const bst_light_line *of, const line_view *all, spans *free) {
+static BST_INLINED void take_hidden(const bst_line_shadow *w, int view, const int hider[2],
+                                    const bst_light_line *of, const line_view *all, spans *free) {
     bst_satellite_pose *p = w->pose;
     const bst_satellite *s = p->satellite;
     const bst_pose_view *v = &p->views[view];
