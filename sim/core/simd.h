@@ -38,6 +38,9 @@
 #define BST_CLONES_16
 #endif
 
+/* for what is to be compiled with its caller, also for wider registers */
+#define BST_INLINED inline __attribute__((always_inline))
+
 #define BST_SIMD_TYPES(width)                                                   \
     typedef float bst_floats_##width __attribute__((vector_size(4 * (width)))); \
     typedef int32_t bst_ints_##width __attribute__((vector_size(4 * (width)))); \

@@ -2,7 +2,7 @@
 
 #include "sim/satellite/gauss_legendre.h"
 
-enum { BREAKS_MAX = 16 };
+enum { BREAKS_MAX = 20 };
 
 /* Borders of the panels of an integral. */
 typedef struct breaks {
@@ -10,15 +10,14 @@ typedef struct breaks {
     int count;
 } breaks;
 
-/* Sorts the borders: few, so that insertion is fastest. */
-static void sort(breaks *b) {
-    for (int i = 1; i < b->count; i++) {
-        double x = b->at[i];
+void bst_sort_few(double *x, int count) {
+    for (int i = 1; i < count; i++) {
+        double at = x[i];
         int k = i;
-        for (; k > 0 && b->at[k - 1] > x; k--) {
-            b->at[k] = b->at[k - 1];
+        for (; k > 0 && x[k - 1] > at; k--) {
+            x[k] = x[k - 1];
         }
-        b->at[k] = x;
+        x[k] = at;
     }
 }
 
@@ -29,19 +28,23 @@ static void add(breaks *b, double x, double low, double high) {
     }
 }
 
-/* Panels for [low, high] with finer ones about the centre of a lobe. */
-static breaks panels(double low, double high, double centre, double lobe_rad) {
-    static const double steps[] = {1.5, 5.0, 18.0};
+/* Panels for [low, high] with finer ones about the centre of a lobe. `fine`: for an error of 3e-5
+ * of a lobe's light in place of 4e-4. */
+static breaks panels(double low, double high, double centre, double lobe_rad, bool fine) {
+    static const double coarse_steps[] = {1.5, 5.0, 18.0};
+    static const double fine_steps[] = {0.8, 2.0, 4.5, 11.0, 30.0};
+    const double *steps = fine ? fine_steps : coarse_steps;
+    int count = fine ? 5 : 3;
     breaks b = {{low, high}, 2};
     if (lobe_rad < 1.0) {
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < count; i++) {
             add(&b, centre - steps[i] * lobe_rad, low, high);
             add(&b, centre + steps[i] * lobe_rad, low, high);
         }
     } else {
         add(&b, 0.5 * (low + high), low, high);
     }
-    sort(&b);
+    bst_sort_few(b.at, b.count);
     return b;
 }
 
@@ -54,8 +57,8 @@ static double sphere_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 s
                (sin(phase) + (BST_PI - phase) * cosine);
     }
     /* longitude in the plane of both directions, from the observer; latitude from that plane */
-    breaks longitude = panels(phase - 0.5 * BST_PI, 0.5 * BST_PI, 0.5 * phase, lobe);
-    breaks latitude = panels(0.0, 0.5 * BST_PI, 0.0, lobe);
+    breaks longitude = panels(phase - 0.5 * BST_PI, 0.5 * BST_PI, 0.5 * phase, lobe, false);
+    breaks latitude = panels(0.0, 0.5 * BST_PI, 0.0, lobe, false);
     for (int p = 0; p + 1 < longitude.count; p++) {
         double half = 0.5 * (longitude.at[p + 1] - longitude.at[p]);
         for (int i = 0; i < BST_GAUSS_POINTS; i++) {
@@ -137,7 +140,7 @@ static double lambert_cone_light(const bst_curved *c, double diffuse, double rad
     if (!add_plain_zeros(&b, in) || !add_plain_zeros(&b, out)) {
         return 0.0;
     }
-    sort(&b);
+    bst_sort_few(b.at, b.count);
     double sum = 0.0;
     for (int p = 0; p + 1 < b.count; p++) {
         double from = b.at[p], to = b.at[p + 1], middle = 0.5 * (from + to);
@@ -150,23 +153,41 @@ static double lambert_cone_light(const bst_curved *c, double diffuse, double rad
     return diffuse / BST_PI * sum;
 }
 
+/* What the light of a cylinder or cone depends on. */
+typedef struct cone_waves {
+    double radial, axial; /* of the normal */
+    wave in, out;         /* cosines of incidence and reflection */
+    breaks borders;       /* of panels, over a turn */
+} cone_waves;
+
+static cone_waves waves_of(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun,
+                           bst_vec3 observer, bool fine) {
+    double rise = c->top_radius_m - c->radius_m, slant = hypot(rise, c->length_m);
+    cone_waves w = {.radial = c->side * c->length_m / slant, .axial = -c->side * rise / slant};
+    w.in = wave_of(c, sun, w.radial, w.axial);
+    w.out = wave_of(c, observer, w.radial, w.axial);
+    wave half = wave_of(c, bst_vec3_add(sun, observer), w.radial, w.axial);
+    double from = half.peak - BST_PI;
+    w.borders = panels(from, from + 2.0 * BST_PI, half.peak, bst_brdf_lobe_rad(brdf), fine);
+    add_zeros(&w.borders, w.in, from);
+    add_zeros(&w.borders, w.out, from);
+    bst_sort_few(w.borders.at, w.borders.count);
+    return w;
+}
+
 /* Light of a cylinder or cone. */
 static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun,
                          bst_vec3 observer) {
     double rise = c->top_radius_m - c->radius_m, slant = hypot(rise, c->length_m), sum = 0.0;
-    double radial = c->side * c->length_m / slant, axial = -c->side * rise / slant;
     double area = 0.5 * slant * (c->radius_m + c->top_radius_m); /* by azimuth */
     if (brdf->model == BST_BRDF_LAMBERT) {
-        return area * lambert_cone_light(c, brdf->diffuse, radial, axial, sun, observer);
+        return area * lambert_cone_light(c, brdf->diffuse, c->side * c->length_m / slant,
+                                         -c->side * rise / slant, sun, observer);
     }
-    double cosine = bst_vec3_dot(sun, observer), lobe = bst_brdf_lobe_rad(brdf);
-    wave in = wave_of(c, sun, radial, axial), out = wave_of(c, observer, radial, axial);
-    wave half = wave_of(c, bst_vec3_add(sun, observer), radial, axial);
-    double from = half.peak - BST_PI;
-    breaks b = panels(from, from + 2.0 * BST_PI, half.peak, lobe);
-    add_zeros(&b, in, from);
-    add_zeros(&b, out, from);
-    sort(&b);
+    double cosine = bst_vec3_dot(sun, observer);
+    cone_waves w = waves_of(c, brdf, sun, observer, true);
+    wave in = w.in, out = w.out;
+    breaks b = w.borders;
     for (int p = 0; p + 1 < b.count; p++) {
         double step = 0.5 * (b.at[p + 1] - b.at[p]), middle = b.at[p] + step;
         if (!(wave_at(in, middle) > 0.0 && wave_at(out, middle) > 0.0)) {
@@ -194,6 +215,30 @@ static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun
         }
     }
     return area * sum;
+}
+
+int bst_curved_panels(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun, bst_vec3 observer,
+                      double (*panel)[2]) {
+    int count = 0;
+    if (c->sphere) {
+        double phase = bst_vec3_angle(sun, observer);
+        breaks b =
+            panels(phase - 0.5 * BST_PI, 0.5 * BST_PI, 0.5 * phase, bst_brdf_lobe_rad(brdf), false);
+        for (; count + 1 < b.count; count++) {
+            panel[count][0] = b.at[count];
+            panel[count][1] = b.at[count + 1];
+        }
+        return count;
+    }
+    cone_waves w = waves_of(c, brdf, sun, observer, false);
+    for (int p = 0; p + 1 < w.borders.count; p++) {
+        double from = w.borders.at[p], to = w.borders.at[p + 1], middle = 0.5 * (from + to);
+        if (wave_at(w.in, middle) > 0.0 && wave_at(w.out, middle) > 0.0) {
+            panel[count][0] = from;
+            panel[count++][1] = to;
+        }
+    }
+    return count;
 }
 
 double bst_curved_light(const bst_curved *curved, const bst_brdf *brdf, bst_vec3 sun,

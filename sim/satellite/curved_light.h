@@ -16,4 +16,19 @@
 double bst_curved_light(const bst_curved *curved, const bst_brdf *brdf, bst_vec3 sun,
                         bst_vec3 observer);
 
+/* Sorts a few numbers, by insertion. */
+void bst_sort_few(double *x, int count);
+
+/* Panels of such an integral, at most. */
+enum { BST_CURVED_PANELS_MAX = 16 };
+
+/* Ranges of azimuth in which a curved surface is lit and in sight, finer about the specular lobe.
+ *
+ * Given:     as bst_curved_light
+ * Returned:  panel  [BST_CURVED_PANELS_MAX] lowest and highest azimuth about z from x, rad; of
+ *                   spheres about sun x observer, from the observer toward the Sun; the number is
+ *                   the return value */
+int bst_curved_panels(const bst_curved *curved, const bst_brdf *brdf, bst_vec3 sun,
+                      bst_vec3 observer, double (*panel)[2]);
+
 #endif

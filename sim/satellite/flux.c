@@ -6,17 +6,28 @@
 #include "sim/satellite/curved_light.h"
 #include "sim/satellite/gauss_legendre.h"
 #include "sim/satellite/sun_disc.h"
+#include "sim/satellite/surface_shadow.h"
 
-enum { CURVED_MAX = 512 };
+enum { ROUND_MAX = 32 };
 
 /* Sums of one evaluation. */
 typedef struct sums {
     double sun[BST_SATELLITE_MATERIALS_MAX]; /* m^2/sr by material */
     double earth[BST_SATELLITE_MATERIALS_MAX];
-    double curved_lost[CURVED_MAX]; /* light of facets that is in shadow or hidden, m^2/sr */
-    bool lost;                      /* any of it */
+    double all, error; /* sunlight so far, and its error, in V */
+    struct {
+        int facet;
+        double area, light; /* free area by polygons; light of a square metre */
+    } round[ROUND_MAX];     /* plane facets in part shadow of which a border is round */
+    int round_count;
     bst_sun_disc disc;
 } sums;
+
+/* Error of one panel of a shadow's integral, of all light. */
+static const double TOLERANCE = 6e-4;
+/* What polygons of 24 sides in place of circles do to the free area of a facet, of its area, at
+ * most; and the error that it may have so, of all light. */
+static const double POLYGON_ERROR = 3e-3, POLYGON_TOLERANCE = 7e-4;
 
 /* The last facet whose reflection was computed: large plane faces consist of many. */
 typedef struct last_facet {
@@ -25,56 +36,52 @@ typedef struct last_facet {
     double light;
 } last_facet;
 
-/* BRDF times both cosines of a facet of a curved surface, for the share that is in shadow. */
-static double curved_facet_light(const bst_satellite_pose *p, const bst_satellite_light *l,
-                                 int index) {
-    double in = bst_vec3_dot(p->normals[index], l->sun);
-    double out = bst_vec3_dot(p->normals[index], l->observer);
-    const bst_material *m = &p->satellite->materials[p->satellite->facets[index].material];
-    if (!(in > 1e-9) || !(out > 1e-9)) {
-        return 0.0;
-    }
-    in = fmin(in, 1.0), out = fmin(out, 1.0);
-    return in * out * bst_brdf_value(&m->brdf, in, out, bst_vec3_dot(l->sun, l->observer));
-}
-
-/* The part of each curved surface's light that is free, of what its facets reflect. */
-static void share_of_curved(const bst_satellite_pose *p, const bst_satellite_light *l,
-                            const sums *s, double *share) {
-    const bst_satellite *sat = p->satellite;
-    double all[CURVED_MAX] = {0};
-    for (int i = 0; i < sat->facet_count; i++) {
-        int c = sat->facets[i].curved;
-        if (c >= 0 && c < CURVED_MAX && s->curved_lost[c] > 0.0) {
-            all[c] += sat->facets[i].area_m2 * curved_facet_light(p, l, i);
-        }
-    }
-    for (int c = 0; c < sat->curved_count && c < CURVED_MAX; c++) {
-        share[c] = all[c] > 0.0 ? fmin(fmax(1.0 - s->curved_lost[c] / all[c], 0.0), 1.0) : 1.0;
-    }
+/* Adds what a surface reflects. `to_v`: factor to V. */
+static void add_light(sums *s, int material, double light, double error, double to_v) {
+    s->sun[material] += light;
+    s->all += light * to_v;
+    s->error += error * to_v;
 }
 
 static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, int index,
                          last_facet *last, sums *s) {
     const bst_facet *f = &p->satellite->facets[index];
     bst_vec3 n = p->normals[index];
-    double in = bst_vec3_dot(n, l->sun), out = bst_vec3_dot(n, l->observer);
-    if (!((in > 1e-9) & (out > 1e-9))) { /* one branch: neither comparison is likely */
+    double in = bst_vec3_dot(n, l->sun), out = bst_vec3_dot(n, l->observer), error = 0.0;
+    /* one branch: none of the comparisons is likely */
+    if (!((in > 1e-9) & (out > 1e-9) & (f->curved < 0))) {
         return;
     }
+    const bst_material *m = &p->satellite->materials[f->material];
     double area = bst_pose_unshadowed_area(p, index, 2);
-    if (f->curved >= 0 && f->curved < CURVED_MAX) {
-        if (area < f->area_m2) {
-            s->curved_lost[f->curved] += (f->area_m2 - area) * curved_facet_light(p, l, index);
-            s->lost = true;
-        }
-        return;
-    }
     if (last->material != f->material || memcmp(&last->normal, &n, sizeof n) != 0) {
-        const bst_material *m = &p->satellite->materials[f->material];
         *last = (last_facet){n, f->material, bst_facet_light(m, &s->disc, n, l->observer)};
     }
-    s->sun[f->material] += area * last->light;
+    if (area > 0.0 && area < f->area_m2 && bst_plane_is_round(p, index)) {
+        error = POLYGON_ERROR * f->area_m2 * last->light;
+        if (s->round_count < ROUND_MAX) {
+            s->round[s->round_count].facet = index;
+            s->round[s->round_count].area = area;
+            s->round[s->round_count++].light = last->light;
+        }
+    }
+    add_light(s, f->material, area * last->light, error, m->colour[BST_SUNLIGHT_V]);
+}
+
+/* Gives plane facets in part shadow round borders where these matter. */
+static void correct_round(bst_satellite_pose *p, sums *s) {
+    double all = s->all;
+    for (int i = 0; i < s->round_count; i++) {
+        const bst_facet *f = &p->satellite->facets[s->round[i].facet];
+        double to_v = p->satellite->materials[f->material].colour[BST_SUNLIGHT_V];
+        double whole = f->area_m2 * s->round[i].light, light = whole * to_v, error;
+        if (POLYGON_ERROR * light > POLYGON_TOLERANCE * all) {
+            double share =
+                bst_plane_free_share(p, s->round[i].facet, TOLERANCE * (all / light), &error);
+            add_light(s, f->material, share * whole - s->round[i].area * s->round[i].light,
+                      (error - POLYGON_ERROR) * whole, to_v);
+        }
+    }
 }
 
 /* True if two curved surfaces have the same light without shadows: the same form and material, side
@@ -104,32 +111,50 @@ static double light_of_curved(const bst_satellite_pose *p, const bst_satellite_l
     return m->scale * sum;
 }
 
-/* Adds the curved surfaces: exact without shadows, times the free part of their facets. Returned:
- * estimate of the error. */
-static double add_curved(const bst_satellite_pose *p, const bst_satellite_light *l, sums *s) {
+/* Light of all curved surfaces without shadows: pose->curved[i].light. Returned: its sum in V. */
+static double light_without_shadows(bst_satellite_pose *p, const bst_satellite_light *l,
+                                    const sums *s) {
     const bst_satellite *sat = p->satellite;
     const bst_curved *last = NULL; /* of which the light is known */
-    double error = 0.0, sum = 0.0, share[CURVED_MAX];
-    if (s->lost) {
-        share_of_curved(p, l, s, share);
-    }
-    for (int i = 0; i < sat->curved_count && i < CURVED_MAX; i++) {
+    double all = 0.0, light = 0.0;
+    for (int i = 0; i < sat->curved_count; i++) {
         const bst_curved *c = &sat->curved[i];
-        const bst_material *m = &sat->materials[c->material];
-        double free = !s->lost ? 1.0 : share[i];
-        if (!(free > 1e-12)) {
-            continue;
-        }
         if (!last || !are_alike(last, c)) {
-            sum = light_of_curved(p, l, &s->disc, c);
+            light = light_of_curved(p, l, &s->disc, c);
             last = c;
         }
-        s->sun[c->material] += free * sum;
-        /* the shadow's border is that of facets, and the lobe may be on either side of it */
-        double lobe = fmin(bst_brdf_lobe_rad(&m->brdf), 1.0);
-        error += sum * free * (1.0 - free) * fmin(0.05 / lobe, 1.0);
+        p->curved[i].light = light;
+        all += light * sat->materials[c->material].colour[BST_SUNLIGHT_V];
     }
-    return error;
+    return all;
+}
+
+/* Adds the curved surfaces: exact without shadows, times the part that nothing hides. */
+static void add_curved(bst_satellite_pose *p, const bst_satellite_light *l, sums *s) {
+    const bst_satellite *sat = p->satellite;
+    double all = s->all + light_without_shadows(p, l, s), left = all;
+    do { /* again if most is in shadow: errors are to be small against what is left */
+        all = fmax(left, 1e-4 * all);
+        left = s->all;
+        for (int i = 0; i < sat->curved_count; i++) {
+            const bst_material *m = &sat->materials[sat->curved[i].material];
+            double light = p->curved[i].light, in_v = light * m->colour[BST_SUNLIGHT_V];
+            p->curved[i].share = 0.0;
+            if (light > 0.0) {
+                p->curved[i].share = bst_curved_free_share(
+                    p, i, light / m->scale, TOLERANCE * (all / in_v), &p->curved[i].error);
+                left += p->curved[i].share * in_v;
+            }
+        }
+    } while (left < 0.25 * all && left > 0.0);
+    for (int i = 0; i < sat->curved_count; i++) {
+        int material = sat->curved[i].material;
+        double light = p->curved[i].light;
+        if (light > 0.0) {
+            add_light(s, material, p->curved[i].share * light, p->curved[i].error * light,
+                      sat->materials[material].colour[BST_SUNLIGHT_V]);
+        }
+    }
 }
 
 /* Reflected earthlight of a facet, and its thermal emission. */
@@ -186,16 +211,17 @@ void bst_satellite_flux_at(bst_satellite_pose *p, const bst_satellite_light *l,
     *out = (bst_satellite_flux){.error = 0.0};
     bst_pose_look(p, 0, l->observer);
     if (l->sunlit > 0.0) {
-        int curved = sat->curved_count < CURVED_MAX ? sat->curved_count : CURVED_MAX;
-        memset(s.curved_lost, 0, (size_t)curved * sizeof s.curved_lost[0]);
-        s.lost = false;
         bst_sun_disc_make(l->sun, l->sun_radius_rad, sat->lobe_rad, &s.disc);
         bst_pose_look(p, 1, l->sun);
+        s.all = s.error = 0.0;
+        s.round_count = 0;
         last_facet last = {.material = -1};
         for (int i = 0; i < sat->facet_count; i++) {
             add_sunlight(p, l, i, &last, &s);
         }
-        out->error = add_curved(p, l, &s);
+        add_curved(p, l, &s);
+        correct_round(p, &s);
+        out->error = fmax(s.error, 0.0); /* rounding */
     }
     if (l->earthlight || l->emission) {
         add_earth_and_emission(p, l, &s, out);

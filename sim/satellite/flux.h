@@ -62,9 +62,11 @@ typedef struct bst_satellite_flux {
  * Given:     pose   joints as bst_satellite_pose_set left them; its views are changed
  *            light  directions
  * Returned:  *out
- * Notes:     shadows of plane facets are exact for the centre of the Sun. Curved surfaces are
- *            integrated without shadows and reduced by the part of their facets' light that is not
- *            in shadow; `error` estimates what that costs. Shadows of earthlight are those of a
+ * Notes:     shadows are those of the centre of the Sun, exact on plane facets unless a border is
+ *            round. Curved surfaces are integrated without shadows and reduced by the part of their
+ *            light that nothing hides (bst_curved_free_share); plane facets with a round border or
+ *            a round hider likewise where they matter. `error` is a bound of what that costs.
+ *            Shadows of earthlight are those of a
  * light at its centroid. Light that is reflected twice is left out. */
 void bst_satellite_flux_at(bst_satellite_pose *pose, const bst_satellite_light *light,
                            bst_satellite_flux *out);

@@ -26,6 +26,7 @@ typedef struct bst_occluder {
     int first_vertex, vertex_count;
     int first_facet, facet_count;
     int first_edge, edge_count;
+    int first_curved, curved_count; /* its curved surfaces */
     bool closed; /* each edge has one facet on each side, or the rim's plane of a shell */
     int shell;   /* index of the shell whose convex hull this is; -1: a solid body */
 } bst_occluder;
@@ -43,7 +44,9 @@ typedef struct bst_shell {
 typedef struct bst_curved {
     int material, joint;
     bool sphere;
+    int occluder;                  /* convex body that it belongs to */
     bst_vec3 x, y, z;              /* unit, frame of the joint */
+    bst_vec3 base_m;               /* centre of the low end, or of the sphere, likewise */
     double radius_m, top_radius_m; /* sphere: radius_m; else at both ends */
     double length_m;               /* along z */
     double side;                   /* 1: outside; -1: inside */

@@ -37,6 +37,8 @@ bst_status bst_model_add_curved(bst_ctx *ctx, bst_satellite *s, const bst_curved
     BST_TRY(
         grow(ctx, (void **)&s->curved, &s->curved_capacity, s->curved_count, sizeof *s->curved));
     s->curved[s->curved_count] = *curved;
+    s->curved[s->curved_count].occluder = s->occluder_count - 1;
+    s->occluders[s->occluder_count - 1].curved_count++;
     *index = s->curved_count++;
     return BST_OK;
 }
@@ -86,8 +88,10 @@ bst_status bst_model_add_facet(bst_ctx *ctx, bst_satellite *s, const bst_part_pl
 bst_status bst_model_begin_occluder(bst_ctx *ctx, bst_satellite *s) {
     BST_TRY(grow(ctx, (void **)&s->occluders, &s->occluder_capacity, s->occluder_count,
                  sizeof *s->occluders));
-    s->occluders[s->occluder_count++] =
-        (bst_occluder){.first_vertex = s->vertex_count, .first_edge = s->edge_count, .shell = -1};
+    s->occluders[s->occluder_count++] = (bst_occluder){.first_vertex = s->vertex_count,
+                                                       .first_edge = s->edge_count,
+                                                       .first_curved = s->curved_count,
+                                                       .shell = -1};
     return BST_OK;
 }
 

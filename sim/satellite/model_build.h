@@ -32,7 +32,7 @@ bst_status bst_model_begin_occluder(bst_ctx *ctx, bst_satellite *s) BST_MUST_CHE
  * BST_ERR_MEMORY. */
 bst_status bst_model_end_occluder(bst_ctx *ctx, bst_satellite *s, int first_facet) BST_MUST_CHECK;
 
-/* Appends a curved surface. *index: its index. BST_ERR_MEMORY. */
+/* Appends a curved surface of the last occluder. *index: its index. BST_ERR_MEMORY. */
 bst_status bst_model_add_curved(bst_ctx *ctx, bst_satellite *s, const bst_curved *curved,
                                 int *index) BST_MUST_CHECK;
 

@@ -52,19 +52,21 @@ static bst_status add_ring(bst_ctx *ctx, bst_satellite *s, const bst_part_place 
     return BST_OK;
 }
 
-/* The curved surface of a part. */
-static bst_curved curved_of(const bst_part_place *place, double radius_m, double top_radius_m,
-                            double length_m) {
+/* The curved surface of a part that starts at a height on its axis. */
+static bst_curved curved_of(const bst_part_place *place, double base_m, double radius_m,
+                            double top_radius_m, double length_m) {
     const bst_mat3 *r = &place->rotation;
-    return (bst_curved){.material = place->material,
-                        .joint = place->joint,
-                        .x = {r->m[0][0], r->m[1][0], r->m[2][0]},
-                        .y = {r->m[0][1], r->m[1][1], r->m[2][1]},
-                        .z = {r->m[0][2], r->m[1][2], r->m[2][2]},
-                        .radius_m = radius_m,
-                        .top_radius_m = top_radius_m,
-                        .length_m = length_m,
-                        .side = 1.0};
+    return (bst_curved){
+        .material = place->material,
+        .joint = place->joint,
+        .x = {r->m[0][0], r->m[1][0], r->m[2][0]},
+        .y = {r->m[0][1], r->m[1][1], r->m[2][1]},
+        .z = {r->m[0][2], r->m[1][2], r->m[2][2]},
+        .base_m = bst_vec3_add(bst_mat3_mul_vec(r, (bst_vec3){0, 0, base_m}), place->position_m),
+        .radius_m = radius_m,
+        .top_radius_m = top_radius_m,
+        .length_m = length_m,
+        .side = 1.0};
 }
 
 /* Facets between two rings of n vertices; a ring of radius 0 is a point, its vertices coincide. */
@@ -108,7 +110,7 @@ static bst_status add_cone(bst_ctx *ctx, bst_satellite *s, const bst_satellite_p
     BST_TRY(bst_model_begin_occluder(ctx, s));
     BST_TRY(add_ring_or_tip(ctx, s, place, n, c->radius_m, -half, low));
     BST_TRY(add_ring_or_tip(ctx, s, place, n, top_m, half, high));
-    bst_curved curved = curved_of(place, c->radius_m, top_m, c->length_m);
+    bst_curved curved = curved_of(place, -half, c->radius_m, top_m, c->length_m);
     BST_TRY(bst_model_add_curved(ctx, s, &curved, &index));
     BST_TRY(add_band(ctx, s, place, n, low, high, index));
     if (!c->open && c->radius_m > 0.0) {
@@ -131,7 +133,7 @@ static bst_status add_sphere(bst_ctx *ctx, bst_satellite *s, const bst_satellite
     /* circles of latitude on a sphere whose meridians have the area of the circle */
     double radius = c->radius_m * polygon_radius(2 * rows);
     BST_TRY(bst_model_begin_occluder(ctx, s));
-    bst_curved curved = curved_of(place, c->radius_m, 0.0, 0.0);
+    bst_curved curved = curved_of(place, 0.0, c->radius_m, 0.0, 0.0);
     curved.sphere = true;
     BST_TRY(bst_model_add_curved(ctx, s, &curved, &index));
     BST_TRY(add_ring_or_tip(ctx, s, place, n, 0.0, -radius, ring[0]));
@@ -175,13 +177,13 @@ static bst_status add_dish(bst_ctx *ctx, bst_satellite *s, const bst_satellite_p
     for (int b = 1; b <= BANDS; b++) {
         double q = (double)b / BANDS, z_m = c->length_m * q * q;
         BST_TRY(add_ring_or_tip(ctx, s, place, n, c->radius_m * q, z_m, ring[b % 2]));
-        bst_curved band =
-            curved_of(place, c->radius_m * (b - 1) / BANDS, c->radius_m * q, z_m - before_m);
+        bst_curved band = curved_of(place, before_m, c->radius_m * (b - 1) / BANDS, c->radius_m * q,
+                                    z_m - before_m);
         BST_TRY(add_dish_band(ctx, s, place, &band, ring[(b + 1) % 2], ring[b % 2], n));
         before_m = z_m;
     }
     BST_TRY(bst_model_end_occluder(ctx, s, first));
-    bst_curved frame = curved_of(place, 0.0, 0.0, 0.0);
+    bst_curved frame = curved_of(place, 0.0, 0.0, 0.0, 0.0);
     bst_shell shell = {place->joint, place->position_m,  frame.z, c->radius_m,
                        c->length_m,  ring[BANDS % 2][0], n};
     return bst_model_set_shell(ctx, s, &shell);

@@ -28,6 +28,8 @@ void bst_satellite_pose_free(bst_satellite_pose *p) {
         free(p->rotation);
         free(p->origin);
         free(p->seen);
+        free(p->hiders);
+        free(p->curved);
         free(p->next);
         free(p->flat);
         free(p->front);
@@ -172,6 +174,8 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
     p->origin = calloc((size_t)s->joint_count + 1, sizeof *p->origin);
     p->facing = calloc((size_t)s->facet_count + 1, sizeof *p->facing);
     p->seen = calloc((size_t)s->occluder_count + 1, sizeof *p->seen);
+    p->hiders = calloc(2 * (size_t)s->occluder_count + 1, sizeof *p->hiders);
+    p->curved = calloc((size_t)s->curved_count + 1, sizeof *p->curved);
     int most = 0, both = 0;
     for (int o = 0; o < s->occluder_count; o++) {
         int vertices = s->occluders[o].vertex_count, edges = s->occluders[o].edge_count;
@@ -182,9 +186,10 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
     p->front_hull = calloc(2 * (size_t)both + 2, sizeof *p->front_hull);
     p->next = calloc((size_t)most + 1, sizeof *p->next);
     p->flat = calloc((size_t)most + 1, sizeof *p->flat);
-    bool made = p->vertices && p->normals && p->rotation && p->origin && p->seen && p->next &&
-                p->flat && p->front && p->front_hull && p->facing && make_view(s, &p->views[0]) &&
-                make_view(s, &p->views[1]) && make_pairs(p) && make_planes(p);
+    bool made = p->vertices && p->normals && p->rotation && p->origin && p->seen && p->hiders &&
+                p->curved && p->next && p->flat && p->front && p->front_hull && p->facing &&
+                make_view(s, &p->views[0]) && make_view(s, &p->views[1]) && make_pairs(p) &&
+                make_planes(p);
     bst_status status =
         made ? make_polygons(ctx, p)
              : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pose of a satellite of %d facets",

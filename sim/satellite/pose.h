@@ -39,6 +39,12 @@ typedef struct bst_pose_pair {
     bst_vec3 axis;
 } bst_pose_pair;
 
+/* A curved surface: its light without shadows, m^2/sr, what share of it is free, and the error of
+ * that. */
+typedef struct bst_pose_curved {
+    double light, share, error;
+} bst_pose_curved;
+
 /* A pose: work memory of one thread for one model. */
 typedef struct bst_satellite_pose {
     const bst_satellite *satellite;
@@ -58,6 +64,8 @@ typedef struct bst_satellite_pose {
     bst_point2 *front, *front_hull; /* work memory of bst_pose_front */
     int *seen;                      /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;
+    int (*hiders)[2];                   /* work memory of bst_line_shadow */
+    bst_pose_curved *curved;            /* likewise of bst_satellite_flux_at, by curved surface */
     int stamp;                          /* counts the poses, from 1 */
     bst_pose_pair *pairs;               /* [occluders][occluders]; NULL: too many */
     int (*faces)[BST_SEPARATION_FACES]; /* by occluder: plane facets; -1: no more */

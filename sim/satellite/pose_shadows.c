@@ -222,18 +222,22 @@ static void look_through_rim(bst_satellite_pose *p, bst_pose_target *t, int view
     bst_polygon_clip_intersect(&p->clip, moved, shell->rim_count);
 }
 
-/* True if the middle of a facet is inside a shell. */
-static bool is_inside(const bst_satellite_pose *p, const bst_facet *facet, const bst_shell *shell) {
+/* The middle of a facet. */
+static bst_vec3 middle_of(const bst_satellite_pose *p, const bst_facet *facet) {
     bst_vec3 middle = {0};
     for (int i = 0; i < facet->count; i++) {
         bst_vec3 q = p->vertices[p->satellite->corner[facet->first + i]];
         middle = bst_vec3_axpy(middle, 1.0 / facet->count, q);
     }
+    return middle;
+}
+
+bool bst_pose_is_inside_shell(const bst_satellite_pose *p, bst_vec3 point, const bst_shell *shell) {
     if (shell->joint >= 0) {
-        middle = bst_mat3_transpose_mul_vec(&p->rotation[shell->joint],
-                                            bst_vec3_sub(middle, p->origin[shell->joint]));
+        point = bst_mat3_transpose_mul_vec(&p->rotation[shell->joint],
+                                           bst_vec3_sub(point, p->origin[shell->joint]));
     }
-    bst_vec3 r = bst_vec3_sub(middle, shell->apex_m);
+    bst_vec3 r = bst_vec3_sub(point, shell->apex_m);
     double z = bst_vec3_dot(r, shell->axis);
     double across2 = bst_vec3_dot(r, r) - z * z;
     return z < shell->depth_m && z > shell->depth_m * across2 / (shell->radius_m * shell->radius_m);
@@ -248,7 +252,8 @@ static void try_occluder(bst_satellite_pose *p, bst_pose_target *t, int view, in
         return;
     }
     bool rim = shell >= 0 &&
-               (occluder == own->occluder || is_inside(p, own, &p->satellite->shells[shell]));
+               (occluder == own->occluder ||
+                bst_pose_is_inside_shell(p, middle_of(p, own), &p->satellite->shells[shell]));
     if (rim && t->pieces) {
         look_through_rim(p, t, view, shell);
     } else if (rim) {

@@ -37,6 +37,10 @@ static inline void bst_pose_add_to_bounds(const bst_pose_view *v, int vertex, do
  * occluders until the next call. */
 int bst_pose_sides(bst_satellite_pose *pose, int view, int occluder, const bst_half_planes **sides);
 
+/* True if a point of the body frame is inside a shell. */
+bool bst_pose_is_inside_shell(const bst_satellite_pose *pose, bst_vec3 point,
+                              const bst_shell *shell);
+
 /* Axis of a shell, body frame. */
 static inline bst_vec3 bst_pose_shell_axis(const bst_satellite_pose *p, int shell) {
     const bst_shell *s = &p->satellite->shells[shell];
