@@ -57,8 +57,8 @@ SCENES = {"formation7": (1, 0.95), "formation12": (10, 0.95), "crossings": (5, 0
 SETTINGS = {"rate": 6.0, "hold": 2, "likelihood": 0, "points": 3, "patience": 4, "gate": 4.0,
             "noise": 0.0067, "density": 1.0}
 CHOICES = {"rate": (2.0, 3.5), "hold": (3, 4), "likelihood": (1,), "points": (2, 4),
-           "patience": (2, 7, 10, 30), "gate": (3.0, 5.0), "noise": (0.001, 0.02, 0.05),
-           "density": (0.3, 3.0)}
+           "patience": (2, 7, 10, 30), "gate": (3.0, 5.0, 7.0),
+           "noise": (0.001, 0.02, 0.05, 0.1, 0.2), "density": (0.3, 3.0)}
 KINDS = ("gnn", "jpda", "mfa")
 FIGURES = ("gospa_px", "ospa2_px", "ghosts", "purity", "switches", "coverage", "false_tracks")
 
