@@ -361,10 +361,9 @@ static void adaptive_noise(void **state) {
         assert_true(f.nis.inside >= 0.9);
         assert_true(f.nees.mean_over_dof <= 1.1);
         if (s.driven == 1.0) {
-            /* lower levels keep a few per cent, and the NEES of mixtures spreads more than
-             * chi-square: 84 % of the steps within the 95 % bounds instead of 90 % */
             bst_assert_close(f.nees.mean_over_dof, 1.0, 0.1);
-            assert_true(f.nees.inside >= 0.75);
+            /* lower levels keep a few per cent, which the narrower bounds of twice the runs show */
+            assert_true(f.nees.inside >= (runs > 100 ? 0.85 : 0.9));
         }
         /* the bound knows the noise; without adaptation steady objects have 2.1 and 4 times it */
         assert_true(s.driven == 0.0 || f.angle <= 1.1);

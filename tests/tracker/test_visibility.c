@@ -158,10 +158,10 @@ static bst_mtt_detection seen_at(bst_vec3 d, bst_rng_key key, uint64_t n) {
         .snr = 20.0};
 }
 
-static bst_mtt *make_tracker(bst_ctx *ctx, double max_dormant_s) {
+static bst_mtt *make_tracker(bst_ctx *ctx, bst_mtt_association association, double max_dormant_s) {
     bst_mtt_params params = {.max_tracks = 50,
                              .max_detections = 50,
-                             .association = BST_MTT_MIXTURE,
+                             .association = association,
                              .noise_rad2ps3 = pow(0.02 * AS, 2),
                              .orbits = true,
                              .orbit_noise_m2ps3 = 1e-6,
@@ -188,7 +188,7 @@ static bst_mtt *make_tracker(bst_ctx *ctx, double max_dormant_s) {
 
 static void run_night(night *g, uint64_t seed) {
     bst_ctx ctx = {0};
-    bst_mtt *mtt = make_tracker(&ctx, g->max_dormant_s);
+    bst_mtt *mtt = make_tracker(&ctx, BST_MTT_MIXTURE, g->max_dormant_s);
     bst_rng_key key = bst_rng_make_key(seed, 1, "test", "night");
     for (int k = 0; k < END; k++) {
         bool dark = k >= DARK_FROM && k < DARK_TO;
@@ -301,7 +301,7 @@ static void a_faint_track_sleeps_after_half_its_coast(void **state) {
     (void)state;
     enum { LAST_SEEN = 300, PERIOD = 7, COAST_HALF = 60 };
     bst_ctx ctx = {0};
-    bst_mtt *mtt = make_tracker(&ctx, 7200);
+    bst_mtt *mtt = make_tracker(&ctx, BST_MTT_MIXTURE, 7200);
     bst_rng_key key = bst_rng_make_key(1, 1, "test", "faint");
     int asleep_from = 0;
     for (int k = 0; k < LAST_SEEN + 120; k += k < LAST_SEEN ? 1 : PERIOD) {
@@ -369,6 +369,41 @@ static void darkness_is_the_same_at_any_frame_period(void **state) {
     }
 }
 
+/* Frames without a detection after which a track ends whose object is as faint as the threshold of
+ * 5, and fades: a detection in every frame, one in eight for 40 s, then none. */
+static int frames_after_fading(bool expected) {
+    enum { FADES = 12, LAST_SEEN = FADES + 40, END_OF_RUN = LAST_SEEN + 150 };
+    bst_ctx ctx = {0};
+    bst_mtt *mtt = make_tracker(&ctx, BST_MTT_PMB, 0);
+    bst_rng_key key = bst_rng_make_key(2, 1, "test", "faded");
+    bst_vec3 d = bst_vec3_from_radec(1.0, 0.3);
+    int tracks = 1, k = 0;
+    for (; k < END_OF_RUN && (k < FADES || tracks > 0); k++) {
+        bst_mtt_detection seen = seen_at(d, key, (uint64_t)k);
+        d = bst_tangent_exp(d, (bst_vec3){-sin(1.0) * 50.0 * AS, cos(1.0) * 50.0 * AS, 0.0});
+        seen.snr = 4.5;
+        bool detected = k < FADES || (k <= LAST_SEEN && (k - FADES) % 8 == 0);
+        bst_mtt_frame f = {.tick = k,
+                           .seconds = k,
+                           .detections = &seen,
+                           .count = detected,
+                           .threshold_snr = 5.0,
+                           .expected = expected ? is_waited_for : NULL};
+        bst_mtt_step(mtt, &f);
+        (void)bst_mtt_tracks(mtt, &tracks);
+    }
+    bst_mtt_free(mtt);
+    return k - 1 - LAST_SEEN;
+}
+
+/* A faint object that the cue expects is kept for max_coast_s, 120 s: misses are no news of it. Any
+ * other one ends by max_misses, 12, or because it exists no more. */
+static void a_faded_target_is_kept(void **state) {
+    (void)state;
+    assert_true(frames_after_fading(false) <= 13);
+    assert_in_range(frames_after_fading(true), 115, 121);
+}
+
 /* A track that falls asleep keeps its correlations: all of its covariances grow by one factor, and
  * its state is that of its orbit. */
 static void falling_asleep_keeps_correlations(void **state) {
@@ -422,6 +457,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shadow_by_angle),
         cmocka_unit_test(darkness_is_the_same_at_any_frame_period),
+        cmocka_unit_test(a_faded_target_is_kept),
         cmocka_unit_test(falling_asleep_keeps_correlations),
         cmocka_unit_test(behind_the_earth),
         cmocka_unit_test(lit_from_behind),

@@ -13,6 +13,12 @@
 /* Mean time after which an object takes any level of process noise anew, s. */
 static const double LEVEL_SOJOURN_S = 1000.0;
 
+/* Probabilities of the levels of a new track, and of one taken anew: a steady object begins to
+ * manoeuvre more often than a manoeuvring one becomes steady. The first level has more because the
+ * lower ones cannot be excluded soon. */
+static const double LEVELS_AT_START[BST_FILTER_LEVELS] = {0.5, 0.1, 0.4},
+                    LEVELS_ANEW[BST_FILTER_LEVELS] = {0.9, 0.05, 0.05};
+
 /* Lower Cholesky factor; columns of zero variance are zero. */
 static void cholesky_factor(const double p[4][4], double l[4][4]) {
     memset(l, 0, 16 * sizeof(double));
@@ -130,13 +136,10 @@ static void start_levels(const bst_sky_state *state, bst_filter_models *models) 
         models->probability[0] = 1.0;
     }
     int n = bst_sky_reduce(models->state, models->probability, models->count, LEVEL_COMPONENTS);
-    for (int i = 0; i < n; i++) {
-        models->probability[i] /= BST_FILTER_LEVELS;
-    }
-    for (int i = 0; i < n * BST_FILTER_LEVELS; i++) {
+    for (int i = n * BST_FILTER_LEVELS - 1; i >= 0; i--) { /* the first n are the source */
         models->state[i] = models->state[i % n];
-        models->probability[i] = models->probability[i % n];
         models->level[i] = i / n;
+        models->probability[i] = models->probability[i % n] * LEVELS_AT_START[i / n];
     }
     models->count = n * BST_FILTER_LEVELS;
     models->levels = BST_FILTER_LEVELS;
@@ -169,7 +172,7 @@ static void append_level(bst_filter_models *models, int level, bst_sky_state *hy
 
 /* Changes between the levels of process noise over dt_s. */
 static void switch_levels(double dt_s, bst_filter_models *models) {
-    double anew = -expm1(-dt_s / LEVEL_SOJOURN_S) / BST_FILTER_LEVELS;
+    double anew = -expm1(-dt_s / LEVEL_SOJOURN_S);
     bst_filter_models before = *models;
     models->count = 0;
     for (int level = 0; level < BST_FILTER_LEVELS; level++) {
@@ -180,7 +183,7 @@ static void switch_levels(double dt_s, bst_filter_models *models) {
             bool stays = before.level[i] == level;
             moved[i] = before.state[i];
             weights[i] =
-                before.probability[i] * (stays ? 1.0 - (BST_FILTER_LEVELS - 1) * anew : anew);
+                before.probability[i] * (anew * LEVELS_ANEW[level] + (stays ? 1.0 - anew : 0.0));
             own += stays;
         }
         append_level(models, level, moved, weights, before.count, own > 0 ? own : LEVEL_COMPONENTS);

@@ -379,7 +379,10 @@ static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool obser
         return true;
     }
     if (track->status != BST_TRACK_TENTATIVE) {
-        return track->may_miss && track->misses_in_row > p->max_misses && track->dark < 0.5;
+        /* one that the cue expects is rather dark or too faint than lost */
+        bool waits =
+            track->dark > 0.0 && bst_mtt_detectable(m, track) < 0.5 * p->detection_probability;
+        return track->may_miss && track->misses_in_row > p->max_misses && !waits;
     }
     if (p->association == BST_MTT_PMB && (!track->at_rest || track->hits < p->confirm_hits)) {
         return track->frames >= TENTATIVE_WINDOWS * p->confirm_frames;
