@@ -104,13 +104,12 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
         return bst_control_start_search(ctx, c, BST_MODE_REACQUIRE, tick,
                                         "the tracker has lost the target");
     }
-    if (!track) { /* it may flash: it is awaited for its time, and may come back as a new track */
+    if (!track) { /* it may flash: it may come back, as a new track, in the time that it was given
+                   */
         BST_TRY(bst_control_best_candidate(ctx, c, tracks, &track));
-        if (!track) {
-            return BST_OK;
-        }
-        bst_control_enter(c, BST_MODE_ACQUIRE, tick,
-                          "another candidate moves as the target should");
+    }
+    if (!track) {
+        return BST_OK;
     }
     if (c->search_in_region && !target && track->uncorrelated) {
         return bst_control_resume_search(ctx, c, tick, "the candidate is something else");
