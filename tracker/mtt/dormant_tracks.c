@@ -19,16 +19,21 @@ static void remove_stored(bst_mtt *m, int i) {
 void bst_mtt_predict_memory(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt_s = frame->seconds - m->seconds;
     double limit2 = m->params.max_dormant_sigma_rad * m->params.max_dormant_sigma_rad;
+    bst_filter_params filter = m->filter;
+    filter.steady_noise_rad2ps3 = 0.0; /* no detections show which level of noise is right */
     int kept = 0;
     for (int i = 0; i < m->memory_count; i++) {
         bst_mtt_track *track = &m->memory[i];
         if (!bst_mtt_predict_orbit(m, track, frame)) {
-            bst_filter_predict(&m->filter, dt_s, &track->state, &track->models);
+            bst_filter_predict(&filter, dt_s, &track->state, &track->models);
         }
         double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
         if (variance <= limit2 &&
             m->seconds + dt_s - track->last_update_s <= m->params.max_dormant_s) {
-            m->memory[kept++] = *track;
+            if (kept < i) {
+                m->memory[kept] = *track;
+            }
+            kept++;
         }
     }
     m->memory_count = kept;
@@ -43,7 +48,11 @@ void bst_mtt_remember(bst_mtt *m, const bst_mtt_track *track) {
         remove_stored(m, 0);
     }
     assert(m->memory_count < m->params.max_dormant_tracks);
-    m->memory[m->memory_count++] = *track;
+    bst_mtt_track *stored = &m->memory[m->memory_count++];
+    *stored = *track;
+    if (m->params.filter != BST_FILTER_IMM) { /* the state is the mean of the components */
+        stored->models.count = stored->models.levels = 0;
+    }
 }
 
 /* The best-fitting earlier track of an object and the second misfit. */
