@@ -42,8 +42,11 @@ typedef struct bst_line_ring {
 /* Lists the bodies that may hide some of a surface.
  *
  * Given:     pose    bst_pose_look has prepared view 0 toward the observer and view 1 toward the
- * Sun body    the occluder that it belongs to inside  it is the inside of a shell rings
- * [ring_count] whose hull contains the surface Returned:  false: there are none; and *shadow */
+ *                    Sun
+ *            body    the occluder that the surface belongs to
+ *            inside  it is the inside of a shell
+ *            rings   [ring_count] whose hull contains the surface
+ * Returned:  false: there are none; and *shadow */
 bool bst_line_shadow_make(bst_satellite_pose *pose, int body, bool inside,
                           const bst_line_ring *rings, int ring_count, bst_line_shadow *shadow);
 
