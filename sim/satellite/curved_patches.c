@@ -2,6 +2,8 @@
 
 #include <stdlib.h>
 
+#include "sim/satellite/pose_view.h"
+
 /* Radius of a regular polygon with the area of a circle, over the circle's radius.
  *
  * Given:     angle  at the centre, of one side */
@@ -48,15 +50,11 @@ bst_status bst_curved_places_create(bst_ctx *ctx, const bst_satellite *s, bst_cu
 static void frame_of(const bst_satellite_pose *p, const bst_curved_places *places, int curved,
                      bst_curved_facet *out) {
     const bst_curved *c = &p->satellite->curved[curved];
-    *out = (bst_curved_facet){
-        .curved = c, .centre = places->centre[curved], .x = c->x, .y = c->y, .z = c->z};
-    if (c->joint >= 0) {
-        const bst_mat3 *r = &p->rotation[c->joint];
-        out->centre = bst_vec3_add(p->origin[c->joint], bst_mat3_mul_vec(r, out->centre));
-        out->x = bst_mat3_mul_vec(r, c->x);
-        out->y = bst_mat3_mul_vec(r, c->y);
-        out->z = bst_mat3_mul_vec(r, c->z);
-    }
+    *out = (bst_curved_facet){.curved = c,
+                              .centre = bst_pose_moved(p, c->joint, places->centre[curved]),
+                              .x = bst_pose_turned(p, c->joint, c->x),
+                              .y = bst_pose_turned(p, c->joint, c->y),
+                              .z = bst_pose_turned(p, c->joint, c->z)};
 }
 
 void bst_curved_facet_make(const bst_satellite_pose *p, const bst_curved_places *places, int facet,

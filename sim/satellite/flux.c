@@ -5,6 +5,7 @@
 
 #include "sim/satellite/curved_light.h"
 #include "sim/satellite/gauss_legendre.h"
+#include "sim/satellite/pose_view.h"
 #include "sim/satellite/sun_disc.h"
 #include "sim/satellite/surface_shadow.h"
 
@@ -100,12 +101,9 @@ static double light_of_curved(const bst_satellite_pose *p, const bst_satellite_l
     int nodes = bst_sun_disc_nodes(m, disc);
     double sum = 0.0;
     for (int k = 0; k < nodes; k++) {
-        bst_vec3 sun = nodes == 1 ? disc->centre : disc->direction[k];
-        bst_vec3 observer = l->observer;
-        if (c->joint >= 0) {
-            sun = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], sun);
-            observer = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], observer);
-        }
+        bst_vec3 sun =
+            bst_pose_turned_back(p, c->joint, nodes == 1 ? disc->centre : disc->direction[k]);
+        bst_vec3 observer = bst_pose_turned_back(p, c->joint, l->observer);
         sum += (nodes == 1 ? 1.0 : disc->weight[k]) * bst_curved_light(c, &m->brdf, sun, observer);
     }
     return m->scale * sum;

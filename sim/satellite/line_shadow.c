@@ -190,10 +190,6 @@ static bst_round_band band_of(const bst_pose_view *v, bst_vec3 base, bst_vec3 ax
     return b;
 }
 
-static bst_vec3 turned(const bst_satellite_pose *p, int joint, bst_vec3 axis) {
-    return joint >= 0 ? bst_mat3_mul_vec(&p->rotation[joint], axis) : axis;
-}
-
 /* Lists the bands of a round body. Returned: the first one; -1: none, or no room. */
 static int add_bands(bst_line_shadow *w, const bst_pose_view *v, int occluder) {
     const bst_satellite_pose *p = w->pose;
@@ -204,12 +200,11 @@ static int add_bands(bst_line_shadow *w, const bst_pose_view *v, int occluder) {
     }
     for (int i = o->first_curved; i < o->first_curved + o->curved_count; i++) {
         const bst_curved *c = &p->satellite->curved[i];
-        bst_vec3 base = turned(p, c->joint, c->base_m);
-        base = c->joint >= 0 ? bst_vec3_add(base, p->origin[c->joint]) : base;
+        bst_vec3 base = bst_pose_moved(p, c->joint, c->base_m);
         if (c->side > 0.0) { /* of a sphere: one circle */
             w->bands[w->band_count++] = c->sphere
                                             ? band_of(v, base, v->z, c->radius_m, c->radius_m, 0.0)
-                                            : band_of(v, base, turned(p, c->joint, c->z),
+                                            : band_of(v, base, bst_pose_turned(p, c->joint, c->z),
                                                       c->radius_m, c->top_radius_m, c->length_m);
         }
     }

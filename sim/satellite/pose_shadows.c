@@ -222,8 +222,7 @@ static void look_through_rim(bst_satellite_pose *p, bst_pose_target *t, int view
     bst_polygon_clip_intersect(&p->clip, moved, shell->rim_count);
 }
 
-/* The middle of a facet. */
-static bst_vec3 middle_of(const bst_satellite_pose *p, const bst_facet *facet) {
+bst_vec3 bst_pose_middle_of(const bst_satellite_pose *p, const bst_facet *facet) {
     bst_vec3 middle = {0};
     for (int i = 0; i < facet->count; i++) {
         bst_vec3 q = p->vertices[p->satellite->corner[facet->first + i]];
@@ -251,9 +250,9 @@ static void try_occluder(bst_satellite_pose *p, bst_pose_target *t, int view, in
         !bst_pose_may_hide(p->views[view].bounds[occluder], t->bounds)) {
         return;
     }
-    bool rim = shell >= 0 &&
-               (occluder == own->occluder ||
-                bst_pose_is_inside_shell(p, middle_of(p, own), &p->satellite->shells[shell]));
+    bool rim = shell >= 0 && (occluder == own->occluder ||
+                              bst_pose_is_inside_shell(p, bst_pose_middle_of(p, own),
+                                                       &p->satellite->shells[shell]));
     if (rim && t->pieces) {
         look_through_rim(p, t, view, shell);
     } else if (rim) {

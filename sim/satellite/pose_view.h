@@ -37,6 +37,26 @@ static inline void bst_pose_add_to_bounds(const bst_pose_view *v, int vertex, do
  * occluders until the next call. */
 int bst_pose_sides(bst_satellite_pose *pose, int view, int occluder, const bst_half_planes **sides);
 
+/* A direction in a joint's frame, turned to the body frame; joint below 0: they are one. */
+static inline bst_vec3 bst_pose_turned(const bst_satellite_pose *p, int joint, bst_vec3 direction) {
+    return joint >= 0 ? bst_mat3_mul_vec(&p->rotation[joint], direction) : direction;
+}
+
+/* Likewise a direction in the body frame, turned to the joint's. */
+static inline bst_vec3 bst_pose_turned_back(const bst_satellite_pose *p, int joint,
+                                            bst_vec3 direction) {
+    return joint >= 0 ? bst_mat3_transpose_mul_vec(&p->rotation[joint], direction) : direction;
+}
+
+/* Likewise a point in a joint's frame, moved to the body frame. */
+static inline bst_vec3 bst_pose_moved(const bst_satellite_pose *p, int joint, bst_vec3 point) {
+    return joint >= 0 ? bst_vec3_add(p->origin[joint], bst_mat3_mul_vec(&p->rotation[joint], point))
+                      : point;
+}
+
+/* Middle of a facet's corners. */
+bst_vec3 bst_pose_middle_of(const bst_satellite_pose *pose, const bst_facet *facet);
+
 /* True if a point of the body frame is inside a shell. */
 bool bst_pose_is_inside_shell(const bst_satellite_pose *pose, bst_vec3 point,
                               const bst_shell *shell);
@@ -44,7 +64,7 @@ bool bst_pose_is_inside_shell(const bst_satellite_pose *pose, bst_vec3 point,
 /* Axis of a shell, body frame. */
 static inline bst_vec3 bst_pose_shell_axis(const bst_satellite_pose *p, int shell) {
     const bst_shell *s = &p->satellite->shells[shell];
-    return s->joint >= 0 ? bst_mat3_mul_vec(&p->rotation[s->joint], s->axis) : s->axis;
+    return bst_pose_turned(p, s->joint, s->axis);
 }
 
 /* The rim of a shell in a view. */
@@ -57,12 +77,9 @@ typedef struct bst_pose_rim {
 static inline bst_pose_rim bst_pose_rim_of(const bst_satellite_pose *p, const bst_pose_view *v,
                                            int index) {
     const bst_shell *shell = &p->satellite->shells[index];
-    bst_pose_rim rim = {.centre = bst_vec3_axpy(shell->apex_m, shell->depth_m, shell->axis),
+    bst_vec3 centre = bst_vec3_axpy(shell->apex_m, shell->depth_m, shell->axis);
+    bst_pose_rim rim = {.centre = bst_pose_moved(p, shell->joint, centre),
                         .axis = bst_pose_shell_axis(p, index)};
-    if (shell->joint >= 0) {
-        rim.centre = bst_vec3_add(p->origin[shell->joint],
-                                  bst_mat3_mul_vec(&p->rotation[shell->joint], rim.centre));
-    }
     rim.rate = bst_vec3_dot(rim.axis, v->z);
     rim.inner_m = shell->radius_m * cos(BST_PI / shell->rim_count);
     return rim;

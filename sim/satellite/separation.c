@@ -1,5 +1,7 @@
 #include "sim/satellite/separation.h"
 
+#include "sim/satellite/pose_view.h"
+
 /* Lowest and highest coordinate of a body along an axis. */
 static void range_of(const bst_satellite_pose *p, const bst_occluder *o, bst_vec3 axis, double *low,
                      double *high) {
@@ -44,9 +46,7 @@ static bool try_faces(const bst_satellite_pose *p, int of, int a, int b, bst_vec
     }
     int shell = s->occluders[of].shell;
     if (shell >= 0) {
-        int joint = s->shells[shell].joint;
-        *axis = s->shells[shell].axis;
-        *axis = joint >= 0 ? bst_mat3_mul_vec(&p->rotation[joint], *axis) : *axis;
+        *axis = bst_pose_shell_axis(p, shell);
         return separates(p, a, b, axis);
     }
     return false;

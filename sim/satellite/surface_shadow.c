@@ -400,14 +400,10 @@ static double add_range(const surface *w, double from, double to, double widest,
 /* Places a curved surface in the body frame. */
 static void place_curved(const bst_satellite_pose *p, surface *w) {
     const bst_curved *c = w->curved;
-    w->base = c->base_m, w->x = c->x, w->y = c->y, w->z = c->z;
-    if (c->joint >= 0) {
-        const bst_mat3 *r = &p->rotation[c->joint];
-        w->base = bst_vec3_add(p->origin[c->joint], bst_mat3_mul_vec(r, c->base_m));
-        w->x = bst_mat3_mul_vec(r, c->x);
-        w->y = bst_mat3_mul_vec(r, c->y);
-        w->z = bst_mat3_mul_vec(r, c->z);
-    }
+    w->base = bst_pose_moved(p, c->joint, c->base_m);
+    w->x = bst_pose_turned(p, c->joint, c->x);
+    w->y = bst_pose_turned(p, c->joint, c->y);
+    w->z = bst_pose_turned(p, c->joint, c->z);
     double rise = c->top_radius_m - c->radius_m;
     w->slant_m = sqrt(rise * rise + c->length_m * c->length_m);
     w->radial = c->sphere ? 1.0 : c->side * c->length_m / w->slant_m;
@@ -458,11 +454,8 @@ double bst_curved_free_share(bst_satellite_pose *p, int curved, double light_m2,
         !(w.shadow.rim[0].radius_m[0] > 0.0 && w.shadow.rim[1].radius_m[0] > 0.0)) {
         return 0.0; /* Sun or observer are behind the rim */
     }
-    bst_vec3 sun = w.sun, observer = w.observer;
-    if (c->joint >= 0) {
-        sun = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], sun);
-        observer = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], observer);
-    }
+    bst_vec3 sun = bst_pose_turned_back(p, c->joint, w.sun);
+    bst_vec3 observer = bst_pose_turned_back(p, c->joint, w.observer);
     int panels = bst_curved_panels(c, w.brdf, sun, observer, panel);
     w.share = tolerance;
     w.tolerance = tolerance * light_m2;
@@ -509,10 +502,7 @@ double bst_plane_free_share(bst_satellite_pose *p, int index, double tolerance, 
     w.x = bst_vec3_unit(bst_vec3_sub(p->vertices[corner[1]], w.base));
     w.y = bst_vec3_cross(w.z, w.x);
     if (disc) {
-        w.base = (bst_vec3){0};
-        for (int i = 0; i < f->count; i++) {
-            w.base = bst_vec3_axpy(w.base, 1.0 / f->count, p->vertices[corner[i]]);
-        }
+        w.base = bst_pose_middle_of(p, f);
         w.radius_m = sqrt(f->area_m2 / BST_PI);
         low = 0.0;
         high = BST_PI;
