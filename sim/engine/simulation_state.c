@@ -14,7 +14,7 @@
 #include "sim/link/crc32c.h"
 #include "sim/world/world.h"
 
-enum { STATE_VERSION = 5 };
+enum { STATE_VERSION = 6 };
 static const char magic[8] = "BSTSTATE";
 
 bst_status bst_scenario_digest(bst_ctx *ctx, const bst_scenario *scenario,

@@ -8,6 +8,7 @@
 #include "sim/eval/consistency.h"
 #include "sim/run/run_arcs.h"
 #include "sim/run/run_candidates.h"
+#include "sim/run/run_custody_reach.h"
 #include "sim/run/run_custody_tables.h"
 #include "sim/run/run_new_objects.h"
 #include "tracker/orbit/custody.h"
@@ -20,11 +21,7 @@ enum { IDENTITY = 10 };
 #define GATE 27.0
 /* A second object in the gate makes a track ambiguous unless it is e^7 times less likely. */
 #define LIKELIHOOD_MARGIN 14.0
-/* Positions are tabulated within 4 s and 1 km: distance of an object from the line of sight beyond
- * which it is no candidate, m; and standard deviations of its own position. */
-#define TABLE_REACH_M (4.1 * 11500.0 + 1000.0)
-#define CANDIDATE_SIGMAS 6.0
-/* time for which the bounds of these distances hold, s */
+/* time for which the bounds of bst_run_reach_of hold, s */
 #define REACH_FOR_S 3600.0
 /* The light of an object may be in an image within one FWHM and so many standard deviations of its
  * predicted direction, but two FWHM at most: farther apart two images are resolved. */
@@ -231,36 +228,11 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
 
 /* ---- correlation ---- */
 
-/* Distance of an object's tabulated position from a line of sight beyond which it is not on it, m.
- */
-static double reach_of(const bst_custody_orbit *orbit, const bst_custody_filter *f, double time_s) {
-    double days = time_s / BST_DAY_S, variance = 0.0;
-    for (int k = BST_CUSTODY_ECC_X; k < BST_CUSTODY_ALONG; k++) {
-        variance += f->p[k][k];
-    }
-    /* a mean anomaly moves the object most at perigee, by the speed there over the mean one */
-    double e = orbit->elements.eccentricity;
-    variance += (1.0 + e) / (1.0 - e) *
-                (f->p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] +
-                 days * (2.0 * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] +
-                         days * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT]));
-    return TABLE_REACH_M + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
-}
-
-/* Whether an object at a tabulated position may be on the line of sight. */
-static bool may_be(double reach_m, bst_vec3 place, const bst_custody_observation *z) {
-    bst_vec3 line = bst_vec3_sub(place, z->observer.position_m);
-    double along = bst_vec3_dot(line, z->direction);
-    double across2 = bst_vec3_dot(line, line) - along * along;
-    return isnan(place.x) || (along > -reach_m && across2 < reach_m * reach_m);
-}
-
-/* Sets the bound of an object: the variance is a quadratic function of time with one minimum, and
- * so largest at an end of the time for which it holds. */
+/* Sets the bound of an object, which is largest at an end of the time for which it holds. */
 static void bound_reach(bst_run_custody *c, int i) {
     c->reach_m[i] =
-        fmax(reach_of(&c->orbits[i], &c->filters[i], c->reach_until_s - 2.0 * REACH_FOR_S),
-             reach_of(&c->orbits[i], &c->filters[i], c->reach_until_s));
+        fmax(bst_run_reach_of(&c->orbits[i], &c->filters[i], c->reach_until_s - 2.0 * REACH_FOR_S),
+             bst_run_reach_of(&c->orbits[i], &c->filters[i], c->reach_until_s));
 }
 
 static void bound_reaches(bst_run_custody *c, double time_s) {
@@ -319,9 +291,35 @@ static void find_new_object(bst_run_custody *c, int sensor, const bst_custody_ob
             continue;
         }
         place = bst_mat3_mul_vec(&z->gcrf_from_teme, place);
-        if (may_be(reach_of(&o->orbit, &o->filter, z->observer.time_s), place, z)) {
+        if (bst_run_reach_holds(bst_run_reach_of(&o->orbit, &o->filter, z->observer.time_s), place,
+                                z)) {
             compare_object(&o->orbit, &o->filter, c->object_count + i, c->fwhm_rad[sensor], z, out);
         }
+    }
+}
+
+/* Compares an observation with an object of the catalogue, and its line with the true one. */
+static void compare_catalogued(bst_run_custody *c, int i, int sensor,
+                               const bst_custody_observation *z, double *nearest, match *out) {
+    const double time_s = z->observer.time_s;
+    const bst_world_state eye = {z->observer.position_m, z->observer.velocity_mps};
+    const bst_vec3 place = {c->place_m[0][i], c->place_m[1][i], c->place_m[2][i]};
+    bst_world_sight sight;
+    bst_ctx quiet = {0}; /* an orbit that has ended is no error here */
+    if (!bst_run_reach_holds(bst_run_reach_of(&c->orbits[i], &c->filters[i], time_s), place, z) ||
+        bst_world_view_sight_from(&quiet, c->view, &eye, i, time_s, &sight) != BST_OK ||
+        sight.range_m < ITSELF_M) {
+        return;
+    }
+    double away = bst_vec3_angle(sight.geometric, z->direction);
+    if (away < *nearest) {
+        *nearest = away;
+        out->true_object = i;
+    }
+    if (c->orbits[i].a_m > 0.0) {
+        bst_custody_add_process_noise(&c->config, time_s, &c->filters[i]);
+        bound_reach(c, i);
+        compare_object(&c->orbits[i], &c->filters[i], i, c->fwhm_rad[sensor], z, out);
     }
 }
 
@@ -330,30 +328,19 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
                         match *out) {
     *out =
         (match){.best = -1, .true_object = -1, .chi2 = NAN, .merit = INFINITY, .second = INFINITY};
-    const double time_s = z->observer.time_s;
-    const bst_world_state eye = {z->observer.position_m, z->observer.velocity_mps};
     double nearest = TRACK_PX * c->pixel_rad[sensor];
-    bound_reaches(c, time_s);
-    (void)bst_world_places(c->world, time_s, c->place_m[0], c->place_m[1], c->place_m[2]);
-    for (int i = 0; i < c->object_count; i++) {
-        const bst_vec3 place = {c->place_m[0][i], c->place_m[1][i], c->place_m[2][i]};
-        bst_world_sight sight;
-        bst_ctx quiet = {0}; /* an orbit that has ended is no error here */
-        if (!may_be(c->reach_m[i], place, z) ||
-            !may_be(reach_of(&c->orbits[i], &c->filters[i], time_s), place, z) ||
-            bst_world_view_sight_from(&quiet, c->view, &eye, i, time_s, &sight) != BST_OK ||
-            sight.range_m < ITSELF_M) {
-            continue;
-        }
-        double away = bst_vec3_angle(sight.geometric, z->direction);
-        if (away < nearest) {
-            nearest = away;
-            out->true_object = i;
-        }
-        if (c->orbits[i].a_m > 0.0) {
-            bst_custody_add_process_noise(&c->config, time_s, &c->filters[i]);
-            bound_reach(c, i);
-            compare_object(&c->orbits[i], &c->filters[i], i, c->fwhm_rad[sensor], z, out);
+    bound_reaches(c, z->observer.time_s);
+    (void)bst_world_places(c->world, z->observer.time_s, c->place_m[0], c->place_m[1],
+                           c->place_m[2]);
+    for (int begin = 0; begin < c->object_count; begin += BST_RUN_REACH_BLOCK) {
+        const int n = c->object_count - begin < BST_RUN_REACH_BLOCK ? c->object_count - begin
+                                                                    : BST_RUN_REACH_BLOCK;
+        int candidate[BST_RUN_REACH_BLOCK];
+        const bool any = bst_run_reach_any(c->place_m, c->reach_m, begin, n, z, candidate);
+        for (int i = 0; any && i < n; i++) {
+            if (candidate[i]) {
+                compare_catalogued(c, begin + i, sensor, z, &nearest, out);
+            }
         }
     }
     find_new_object(c, sensor, z, out);

@@ -225,19 +225,42 @@ static long resident_pages(void) {
     return resident;
 }
 
-static void a_day_takes_no_more_memory_than_a_minute(void **state) {
+static void a_day_takes_no_more_memory_than_ten_minutes(void **state) {
     (void)state;
     bst_world *world = populated(1500, 3.0);
     bst_ephemeris_cone cone = {.apex_m = {7e6, 0, 0}, .axis = {1, 0, 0}, .half_angle_rad = 0.02};
     int *near = malloc(1500 * sizeof *near);
     assert_non_null(near);
     long before = 0;
-    for (double t = 0; t < DAY; t += t < 60 ? 4 : 900) {
+    for (double t = 0; t < DAY; t += t < 600 ? 4 : 900) {
         (void)bst_ephemeris_near(world->ephemeris, t, &cone, near);
-        before = t < 60 ? resident_pages() : before;
+        before = t < 600 ? resident_pages() : before; /* all tables are made */
     }
     /* knots of a day would be 100 MiB; the test's own files and stack take a few pages */
     assert_true((resident_pages() - before) * sysconf(_SC_PAGESIZE) < 1 << 20);
+    free(near);
+    bst_world_free(world);
+}
+
+/* Observers that ask for times of two minutes ago and of now, by turns, as the custody of a
+ * catalogue does: no table is made twice, whatever the distance of the times. */
+static void times_by_turns_make_no_table_twice(void **state) {
+    (void)state;
+    bst_world *world = populated(1500, 3.0);
+    bst_ephemeris_cone cone = {.apex_m = {7e6, 0, 0}, .axis = {1, 0, 0}, .half_angle_rad = 0.02};
+    int *near = malloc(1500 * sizeof *near);
+    assert_non_null(near);
+    for (int back = 8; back <= 200; back += 8) {
+        const double now = 1e4 + 1e3 * back;
+        (void)bst_ephemeris_near(world->ephemeris, now - back, &cone, near);
+        (void)bst_ephemeris_near(world->ephemeris, now, &cone, near);
+        const int64_t made = bst_ephemeris_tables_made(world->ephemeris);
+        for (int i = 0; i < 10; i++) {
+            (void)bst_ephemeris_near(world->ephemeris, now - back, &cone, near);
+            (void)bst_ephemeris_near(world->ephemeris, now, &cone, near);
+        }
+        assert_int_equal(bst_ephemeris_tables_made(world->ephemeris), made);
+    }
     free(near);
     bst_world_free(world);
 }
@@ -544,7 +567,8 @@ int main(void) {
         cmocka_unit_test(error_is_below_a_thousandth_of_a_pixel),
         cmocka_unit_test(order_and_threads_change_no_bit),
         cmocka_unit_test(readers_at_different_times_keep_their_knots),
-        cmocka_unit_test(a_day_takes_no_more_memory_than_a_minute),
+        cmocka_unit_test(a_day_takes_no_more_memory_than_ten_minutes),
+        cmocka_unit_test(times_by_turns_make_no_table_twice),
         cmocka_unit_test(what_has_decayed_stays_away),
         cmocka_unit_test(a_decay_that_is_ahead_changes_no_table),
         cmocka_unit_test(a_search_finds_what_is_in_the_cone_and_little_beside_it),

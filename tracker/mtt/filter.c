@@ -12,6 +12,8 @@
 
 /* Mean time after which an object takes any level of process noise anew, s. */
 static const double LEVEL_SOJOURN_S = 1000.0;
+/* Time after which such changes are taken into account: few objects change twice in it. */
+static const double LEVEL_SWITCH_S = 4.0;
 
 /* Probabilities of the levels of a new track, and of one taken anew: a steady object begins to
  * manoeuvre more often than a manoeuvring one becomes steady. The first level has more because the
@@ -74,6 +76,7 @@ void bst_filter_start(const bst_filter_params *params, const bst_sky_state *stat
                       bst_filter_models *models) {
     assert(params && models && state && bst_is_covariance(&state->covariance[0][0], 4));
     models->count = models->levels = 0;
+    models->unswitched_s = 0.0;
     if (params->kind != BST_FILTER_IMM) {
         return;
     }
@@ -143,6 +146,7 @@ static void start_levels(const bst_sky_state *state, bst_filter_models *models) 
     }
     models->count = n * BST_FILTER_LEVELS;
     models->levels = BST_FILTER_LEVELS;
+    models->unswitched_s = 0.0;
 }
 
 /* Appends the hypotheses of one level, reduced to `keep`, to the components. */
@@ -170,9 +174,14 @@ static void append_level(bst_filter_models *models, int level, bst_sky_state *hy
     }
 }
 
-/* Changes between the levels of process noise over dt_s. */
+/* Changes between the levels of process noise over dt_s, once LEVEL_SWITCH_S have passed. */
 static void switch_levels(double dt_s, bst_filter_models *models) {
-    double anew = -expm1(-dt_s / LEVEL_SOJOURN_S);
+    models->unswitched_s += dt_s;
+    if (models->unswitched_s < LEVEL_SWITCH_S) {
+        return;
+    }
+    double anew = -expm1(-models->unswitched_s / LEVEL_SOJOURN_S);
+    models->unswitched_s = 0.0;
     bst_filter_models before = *models;
     models->count = 0;
     for (int level = 0; level < BST_FILTER_LEVELS; level++) {

@@ -34,6 +34,7 @@ enum { BST_FILTER_LEVELS = 3 };
 typedef struct bst_filter_models {
     int count;  /* 0: the state is a single Gaussian */
     int levels; /* BST_FILTER_LEVELS: components have levels, 0: they have none */
+    double unswitched_s; /* time since changes between levels were last taken into account */
     int level[BST_FILTER_COMPONENTS];
     bst_sky_state state[BST_FILTER_COMPONENTS];
     double probability[BST_FILTER_COMPONENTS];
@@ -64,9 +65,9 @@ void bst_filter_start(const bst_filter_params *params, const bst_sky_state *stat
  * each; the state becomes their mixture.
  *
  * Notes:     with steady_noise_rad2ps3 each component assumes a level of process noise. Components
- *            without levels get all of them, equally probable. From then on an object takes any
- *            level anew at random times, and each level's components are merged to as many as it
- *            had. Without steady_noise_rad2ps3 levels are forgotten.
+ *            without levels get all of them. From then on an object takes any level anew at random
+ *            times, which is taken into account every 4 s: each level's components are merged to
+ *            as many as it had. Without steady_noise_rad2ps3 levels are forgotten.
  * Reference: Blom and Bar-Shalom 1988 */
 void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_state *state,
                         bst_filter_models *models);

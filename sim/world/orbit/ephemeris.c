@@ -26,7 +26,7 @@ enum { STEP_CLASSES = 5, SHORTEST_STEP_S = 16 };
 #define DECAYED_M 6378136.0
 
 /* Tables of the positions of all objects, on a grid of time. */
-enum { TABLE_STEP_S = 8, TABLES = 4 };
+enum { TABLE_STEP_S = 8, TABLES = 32 };
 /* error of a position in a table */
 #define TABLE_ERROR_M 1000.0
 #define TABLE_SPAN_S 60.0 /* validity of the speed limit in a table */
@@ -52,7 +52,8 @@ typedef struct rotations {
 typedef struct table {
     int64_t index; /* time / TABLE_STEP_S */
     bool valid;
-    int users; /* threads that read the table without the lock */
+    int users;    /* threads that read the table without the lock */
+    int64_t used; /* time of its last use: count of requests */
     bst_ephemeris_rows rows;
 } table;
 
@@ -68,6 +69,7 @@ struct bst_ephemeris {
     int64_t knots_made; /* by readers, not for tables */
     rotations rotations[STEP_CLASSES];
     table tables[TABLES];
+    int64_t requests, tables_made;
     char *table_memory;
 };
 
@@ -258,6 +260,13 @@ int64_t bst_ephemeris_knots_made(bst_ephemeris *e) {
     return made;
 }
 
+int64_t bst_ephemeris_tables_made(bst_ephemeris *e) {
+    pthread_mutex_lock(&e->lock);
+    int64_t made = e->tables_made;
+    pthread_mutex_unlock(&e->lock);
+    return made;
+}
+
 /* ---- tables ---- */
 
 /* Data of a table that all bodies with the same step size share. */
@@ -347,6 +356,16 @@ static void table_rows(void *user, int begin, int end) {
     }
 }
 
+/* The table of a time, NULL: it is not there. */
+static table *find_table(bst_ephemeris *e, int64_t index) {
+    for (int i = 0; i < TABLES; i++) {
+        if (e->tables[i].valid && e->tables[i].index == index) {
+            return &e->tables[i];
+        }
+    }
+    return NULL;
+}
+
 /* Makes the table of all objects' positions at one time. */
 static void make_table(bst_ephemeris *e, table *t, int64_t index) {
     table_job job = {.e = e, .table = t};
@@ -375,25 +394,38 @@ static void make_table(bst_ephemeris *e, table *t, int64_t index) {
         job.gcrf_from_teme[i] = sky.frames.gcrf_from_teme;
     }
     /* the next consecutive table needs few new knots: one thread is faster */
-    const table *before = &e->tables[slot_of(index - 1, TABLES)];
-    bool in_turn = before->valid && before->index == index - 1;
+    bst_parallel *pool = find_table(e, index - 1) ? NULL : e->pool;
     t->index = index;
-    bst_parallel_for(in_turn ? NULL : e->pool, e->object_count, GRAIN, table_rows, &job);
+    e->tables_made++;
+    bst_parallel_for(pool, e->object_count, GRAIN, table_rows, &job);
     t->valid = true;
+}
+
+/* The table that was not used for the longest time and that no one reads; NULL: all are read. */
+static table *oldest_table(bst_ephemeris *e) {
+    table *oldest = NULL;
+    for (int i = 0; i < TABLES; i++) {
+        table *t = &e->tables[i];
+        if (t->users == 0 && (!oldest || t->used < oldest->used)) {
+            oldest = t;
+        }
+    }
+    return oldest;
 }
 
 /* The table of positions at a time; computes it if it is missing. With the lock held. */
 static table *table_at(bst_ephemeris *e, int64_t index) {
-    table *t = &e->tables[slot_of(index, TABLES)];
-    while (t->users > 0 &&
-           t->index != index) { /* another thread reads an old table; this is short */
-        pthread_mutex_unlock(&e->lock);
-        sched_yield();
-        pthread_mutex_lock(&e->lock);
+    table *t, *oldest;
+    while (!(t = find_table(e, index))) {
+        if ((oldest = oldest_table(e)) != NULL) {
+            make_table(e, oldest, index);
+        } else { /* another thread reads each of them; this is short */
+            pthread_mutex_unlock(&e->lock);
+            sched_yield();
+            pthread_mutex_lock(&e->lock);
+        }
     }
-    if (!t->valid || t->index != index) {
-        make_table(e, t, index);
-    }
+    t->used = ++e->requests;
     return t;
 }
 

@@ -58,6 +58,8 @@ bool bst_ephemeris_at(bst_ephemeris *ephemeris, bst_ephemeris_reader *reader, in
 
 /* Number of knots that calls of bst_ephemeris_at had to compute so far. */
 int64_t bst_ephemeris_knots_made(bst_ephemeris *ephemeris);
+/* Number of tables of all objects' positions computed so far. The last 32 are kept. */
+int64_t bst_ephemeris_tables_made(bst_ephemeris *ephemeris);
 
 /* A cone of directions from an observer, with tolerances in time and position. */
 typedef struct bst_ephemeris_cone {
