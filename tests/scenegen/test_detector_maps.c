@@ -234,7 +234,7 @@ static void tracks_of_charge(void **state) {
     bst_cosmic_rays_free(h);
 }
 
-/* Maps are the same bits whoever draws their rows. */
+/* Maps are the same bits whichever thread draws their rows. */
 static void threads_draw_the_same_maps(void **state) {
     (void)state;
     static float maps[2][2][STRIDE * HEIGHT];
