@@ -13,13 +13,21 @@ bst_vec3 bst_resolved_shadow_sun(const bst_resolved_light *l) {
 
 /* Least cosine of incidence: at less, the penumbra is as wide as the facet. */
 static const double GRAZING = 0.005;
+/* Distance from an outline, over the satellite's radius, and from a rim's circle, over its radius,
+ * up to which a side lies on it: the model's rims have 12 corners or more, the image's 96. */
+static const double BESIDE = 1e-6, BESIDE_RIM = 0.05;
+
+/* Share of a length below which it is none. */
+static const double TINY = 1e-9;
 
 /* Where the Sun is moved by d across the light, a shadow moves by gap (d - z (n . d) / (n . z)) on
- * the facet; half the width of the penumbra is the larger singular value of that in the image. */
-void bst_resolved_note_shadow(const bst_resolved_adding *a, bst_vec3 normal, bst_vec3 place,
-                              double light, double gap_m) {
+ * the facet. Half the width of the penumbra is the largest motion across its border in the image,
+ * of which d is on the Sun's limb. */
+void bst_resolved_note_shadow(const bst_resolved_adding *a, bst_vec3 normal, bst_vec3 from,
+                              bst_vec3 to, double light, double gap_m) {
     bst_resolved_image *m = &a->r->image;
-    bst_vec3 z = a->light->sun, eye = bst_vec3_sub(a->eye_m, place), way[2];
+    bst_vec3 z = a->light->sun, way[2], along = bst_vec3_sub(to, from);
+    bst_vec3 eye = bst_vec3_sub(a->eye_m, bst_vec3_axpy(from, 0.5, along));
     double range_m = bst_vec3_norm(eye), in = fmax(bst_vec3_dot(normal, z), GRAZING);
     if (!(a->light->sun_radius_rad > 0.0 && gap_m > 0.0 && light > 0.0)) {
         return;
@@ -34,6 +42,12 @@ void bst_resolved_note_shadow(const bst_resolved_adding *a, bst_vec3 normal, bst
     double xx = bst_vec3_dot(way[0], way[0]), yy = bst_vec3_dot(way[1], way[1]);
     double xy = bst_vec3_dot(way[0], way[1]);
     double largest = sqrt(0.5 * (xx + yy) + hypot(0.5 * (xx - yy), xy));
+    bst_vec3 across = bst_vec3_cross(eye, along);
+    double length = bst_vec3_norm(across);
+    if (length > TINY * a->r->satellite->radius_m) {
+        across = bst_vec3_scale(across, 1.0 / length);
+        largest = hypot(bst_vec3_dot(way[0], across), bst_vec3_dot(way[1], across));
+    }
     double px = a->light->sun_radius_rad * gap_m * largest * a->per_m * m->cell_px / range_m;
     int octave = (int)fmin(fmax(floor(log2(px)) + 8.0, 0.0), BST_RESOLVED_PENUMBRAE - 1.0);
     bst_resolved_penumbra *p = &m->penumbrae[octave];
@@ -41,28 +55,125 @@ void bst_resolved_note_shadow(const bst_resolved_adding *a, bst_vec3 normal, bst
     p->px = fmax(p->px, px);
 }
 
-void bst_resolved_note_shadows_on(const bst_resolved_adding *a, int index, double light) {
-    const bst_satellite_pose *p = a->pose;
-    const bst_satellite *s = p->satellite;
-    const bst_facet *facet = &s->facets[index];
-    const bst_pose_view *v = &p->views[0];
-    bst_vec3 normal = p->normals[index], place = p->vertices[s->corner[facet->first]];
-    double bounds[6], gap_m = 0.0, in = fmax(bst_vec3_dot(normal, v->z), GRAZING);
-    bst_pose_start_bounds(bounds);
-    for (int i = 0; i < facet->count; i++) {
-        bst_pose_add_to_bounds(v, s->corner[facet->first + i], bounds);
+/* A side of what the Sun reaches of a plane: its ends in the plane, body frame, and along the x and
+ * y of the view from the Sun. */
+typedef struct lit_side {
+    bst_vec3 at[2], normal;
+    bst_point2 flat[2];
+    double light;
+} lit_side;
+
+/* Nearness to the Sun of a corner of an outline, m: that of the nearest vertex there. */
+static double depth_of(const bst_pose_view *v, const bst_occluder *o, bst_point2 corner) {
+    double depth_m = -INFINITY;
+    for (int i = o->first_vertex; i < o->first_vertex + o->vertex_count; i++) {
+        if (v->flat[i].x == corner.x && v->flat[i].y == corner.y) {
+            depth_m = fmax(depth_m, v->depth_m[i]);
+        }
     }
-    for (int o = 0; o < s->occluder_count; o++) {
-        const bst_occluder *body = &s->occluders[o];
-        if ((o == facet->occluder && !facet->inside) || !bst_pose_may_hide(v->bounds[o], bounds)) {
+    return depth_m;
+}
+
+/* Keeps the width of the penumbra where a lit side ends at the outline of a body. */
+static void note_outline(const bst_resolved_adding *a, const lit_side *s, int body) {
+    const bst_pose_view *v = &a->pose->views[0];
+    const bst_occluder *o = &a->r->satellite->occluders[body];
+    const bst_point2 *outline;
+    int count = bst_pose_outline(a->pose, 0, body, &outline);
+    double beside_m = BESIDE * a->r->satellite->radius_m;
+    double from_m = bst_vec3_dot(s->at[0], v->z), to_m = bst_vec3_dot(s->at[1], v->z);
+    for (int i = 0; i < count; i++) {
+        bst_point2 p = outline[i], q = outline[i + 1 < count ? i + 1 : 0];
+        double length = hypot(q.x - p.x, q.y - p.y), t[2];
+        if (!(length > beside_m) ||
+            fabs(bst_point2_left_of(p, q, s->flat[0])) > beside_m * length ||
+            fabs(bst_point2_left_of(p, q, s->flat[1])) > beside_m * length) {
             continue;
         }
-        double most_m = -INFINITY;
-        for (int i = body->first_vertex; i < body->first_vertex + body->vertex_count; i++) {
-            double up_m = bst_vec3_dot(normal, bst_vec3_sub(p->vertices[i], place));
-            most_m = fmax(most_m, up_m / in);
+        for (int k = 0; k < 2; k++) { /* along the outline's side */
+            t[k] = (s->flat[k].x - p.x) * (q.x - p.x) + (s->flat[k].y - p.y) * (q.y - p.y);
+            t[k] /= length * length;
         }
-        gap_m = fmax(gap_m, fmin(most_m, v->bounds[o][5] - bounds[4]));
+        double low = fmax(fmin(t[0], t[1]), 0.0), high = fmin(fmax(t[0], t[1]), 1.0);
+        if (!(low < high)) {
+            continue;
+        }
+        double near_m = depth_of(v, o, p), far_m = depth_of(v, o, q), gap_m = 0.0;
+        for (int k = 0; k < 2; k++) {
+            double at = k == 0 ? low : high, u = (at - t[0]) / (t[1] - t[0]);
+            double above_m = near_m + at * (far_m - near_m);
+            gap_m = fmax(gap_m, above_m - from_m - u * (to_m - from_m));
+        }
+        bst_resolved_note_shadow(a, s->normal, s->at[0], s->at[1], s->light, gap_m);
     }
-    bst_resolved_note_shadow(a, normal, place, light, gap_m);
+}
+
+/* The same where it ends at the shadow of a shell's rim. */
+static void note_rim(const bst_resolved_adding *a, const lit_side *s, int shell) {
+    const bst_pose_view *v = &a->pose->views[0];
+    bst_pose_rim rim = bst_pose_rim_of(a->pose, v, shell);
+    double radius_m = a->r->satellite->shells[shell].radius_m, gap_m = 0.0;
+    for (int k = 0; k < 2; k++) {
+        bst_vec3 r = bst_vec3_sub(s->at[k], rim.centre);
+        double way = -bst_vec3_dot(r, rim.axis) / rim.rate;
+        r = bst_vec3_axpy(r, way, v->z);
+        if (!(rim.rate > 0.0 && fabs(bst_vec3_norm(r) - radius_m) < BESIDE_RIM * radius_m)) {
+            return;
+        }
+        gap_m = fmax(gap_m, way);
+    }
+    bst_resolved_note_shadow(a, s->normal, s->at[0], s->at[1], s->light, gap_m);
+}
+
+/* Keeps it for a side of what is lit of a facet. */
+static void note_side(const bst_resolved_adding *a, int index, const double bounds[6],
+                      const lit_side *s) {
+    const bst_satellite *sat = a->r->satellite;
+    const bst_facet *facet = &sat->facets[index];
+    for (int o = 0; o < sat->occluder_count; o++) {
+        int shell = sat->occluders[o].shell;
+        if ((o == facet->occluder && !facet->inside) ||
+            !bst_pose_may_hide(a->pose->views[0].bounds[o], bounds)) {
+            continue;
+        }
+        if (o != facet->occluder) {
+            note_outline(a, s, o);
+        }
+        if (shell >= 0) {
+            note_rim(a, s, shell);
+        }
+    }
+}
+
+void bst_resolved_note_shadows_on(const bst_resolved_adding *a, int index, bst_vec3 place,
+                                  bst_vec3 normal, double light, bool flat) {
+    const bst_satellite *sat = a->r->satellite;
+    const bst_facet *facet = &sat->facets[index];
+    const bst_pose_view *v = &a->pose->views[0];
+    const bst_polygon_clip *clip = &a->pose->clip;
+    double bounds[6], in = fmax(bst_vec3_dot(normal, v->z), GRAZING);
+    bst_vec3 origin, e1, e2;
+    bst_pose_facet_axes(a->pose, index, &origin, &e1, &e2);
+    bst_pose_start_bounds(bounds);
+    for (int i = 0; i < facet->count; i++) {
+        bst_pose_add_to_bounds(v, sat->corner[facet->first + i], bounds);
+    }
+    for (int n = 0; n < clip->piece_count; n++) {
+        const bst_polygon_piece *piece = &clip->pieces[n];
+        for (int i = 0; i < piece->count; i++) {
+            lit_side s = {.normal = normal, .light = light};
+            for (int k = 0; k < 2; k++) {
+                int next = i + k < piece->count ? i + k : 0;
+                bst_point2 p = clip->points[piece->first + next];
+                bst_vec3 q = bst_vec3_axpy(bst_vec3_axpy(origin, p.x, e1), p.y, e2);
+                if (flat) {
+                    q = bst_vec3_axpy(bst_vec3_scale(v->x, p.x), p.y, v->y);
+                    q = bst_vec3_axpy(q, bst_vec3_dot(normal, bst_vec3_sub(place, q)) / in, v->z);
+                }
+                s.at[k] = q;
+                s.flat[k] = (bst_point2){bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y)};
+            }
+            note_side(a, index, bounds, &s);
+        }
+    }
 }
