@@ -323,6 +323,23 @@ static void find_ends(const bst_polygon_clip *clip, const bst_layers_border *b,
     }
 }
 
+/* Sets the side of a facet on which an end of a line is. */
+static void find_side(const bst_facet_layers *l, int facet, const bst_layers_outline *own,
+                      bst_layers_end *end, int k) {
+    end->side[k] = (bst_point2){0.0, 0.0};
+    end->beside[k] = -1;
+    for (int i = 0; i < own->count; i++) {
+        bst_point2 a = own->p[i], b = own->p[i + 1 < own->count ? i + 1 : 0];
+        bst_point2 way = {b.x - a.x, b.y - a.y};
+        if (fabs(left_of(a, way, end->place[k])) <= BESIDE * hypot(way.x, way.y)) {
+            /* corners of the net are in the other order */
+            int corner = (2 * own->count - 2 - i) % own->count;
+            end->side[k] = way;
+            end->beside[k] = l->net->beside[l->net->first[facet] + corner];
+        }
+    }
+}
+
 int bst_facet_layers_ends(const bst_facet_layers *l, int facet, bst_layers_end *out) {
     bst_layers_outline own;
     int borders[BST_LAYERS_ENDS], ends = 0;
@@ -346,6 +363,7 @@ int bst_facet_layers_ends(const bst_facet_layers *l, int facet, bst_layers_end *
             double x = b->a.x + t[i] * (b->b.x - b->a.x), y = b->a.y + t[i] * (b->b.y - b->a.y);
             double near = b->near[0] + t[i] * (b->near[1] - b->near[0]);
             end->place[i] = (bst_point2){x, y};
+            find_side(l, facet, &own, end, i);
             end->gap = fmax(end->gap, near - plane[0] - plane[1] * x - plane[2] * y);
         }
         ends += end->gap > 0.0;

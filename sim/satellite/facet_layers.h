@@ -105,10 +105,12 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *layers,
  *            counter-clockwise */
 bool bst_facet_layers_cut(bst_facet_layers *layers, int facet);
 
-/* Where what is left of a facet ends at a nearer border: both ends of that line, and how much
- * nearer the border is at most. */
+/* Where what is left of a facet ends at a nearer border: both ends of that line, how much nearer
+ * the border is at most, and the sides of the facet that the line ends at: their directions in the
+ * view and the facets beside them; 0 and -1: at none. */
 typedef struct bst_layers_end {
-    bst_point2 place[2];
+    bst_point2 place[2], side[2];
+    int beside[2];
     double gap;
 } bst_layers_end;
 

@@ -181,16 +181,27 @@ static void note_shadows(const bst_resolved_adding *a, int facet, const bst_reso
                          double light) {
     const bst_resolved_areas *s = &a->r->areas;
     bst_layers_end end[BST_LAYERS_ENDS];
-    double plane[3], most_m = 2.0 * a->r->satellite->radius_m;
-    bst_vec3 normal = s->planes[facet].normal, middle = s->middles[facet];
+    double plane[3];
+    bst_resolved_border border = {.normal = s->planes[facet].normal, .light = light};
     int count = bst_facet_layers_ends(&s->lit[0], facet, end);
     if (count < 0) {
-        bst_resolved_note_shadow(a, normal, middle, middle, light, most_m);
+        border.at[0] = border.at[1] = s->middles[facet];
+        border.gap_m = 2.0 * a->r->satellite->radius_m;
+        bst_resolved_note_shadow(a, &border);
     }
     for (int i = 0; i < count && bst_facet_layers_plane(&s->lit[0], facet, plane); i++) {
-        bst_vec3 from = place_on(v, plane, end[i].place[0]);
-        bst_vec3 to = place_on(v, plane, end[i].place[1]);
-        bst_resolved_note_shadow(a, normal, from, to, light, end[i].gap);
+        border.gap_m = end[i].gap;
+        for (int k = 0; k < 2; k++) {
+            bst_point2 p = end[i].place[k], way = end[i].side[k];
+            int beside = end[i].beside[k];
+            border.at[k] = place_on(v, plane, p);
+            bst_vec3 next = place_on(v, plane, (bst_point2){p.x + way.x, p.y + way.y});
+            border.side[k] = bst_vec3_sub(next, border.at[k]);
+            /* the shadow goes on there if it is lit */
+            bool lit = beside >= 0 && s->eye.facing[beside] && s->lit[0].facing[beside];
+            border.change[k] = lit ? fmin(fabs(light - s->from[0][beside]), light) : light;
+        }
+        bst_resolved_note_shadow(a, &border);
     }
 }
 
