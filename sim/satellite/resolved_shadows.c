@@ -41,7 +41,8 @@ static double cotangent(bst_vec3 a, bst_vec3 b, bst_vec3 eye) {
  * the facet. Half the width of the penumbra is the largest motion across its border in the image,
  * of which d is on the Sun's limb. Where the border meets a side of the facet at an angle, the
  * corner moves along the side by the cotangent of that more than across the border: the error of
- * order n in the width there has n - 1 of it as factors, about. */
+ * order n in the width there has n - 1 of it as factors, about.
+ * tests/scenegen/test_penumbra_bound.c: 0.5 is too little with 7 points. */
 void bst_resolved_note_shadow(const bst_resolved_adding *a, const bst_resolved_border *b) {
     static const double CORNER_POWER = 0.6;
     bst_resolved_image *m = &a->r->image;
