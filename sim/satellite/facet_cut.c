@@ -296,30 +296,77 @@ bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
     return whole;
 }
 
-double bst_facet_layers_gap(const bst_facet_layers *l, int facet) {
-    enum { BORDERS = 256 };
+/* Distance from a border, in cells, up to which a side of what is left lies on it. */
+static const double BESIDE = 1e-6;
+
+/* Extends the part of a border, from t[0] to t[1] along it, on which what is left of a facet ends
+ * within `part`. */
+static void find_ends(const bst_polygon_clip *clip, const bst_layers_border *b,
+                      const double part[2], double t[2]) {
+    bst_point2 way = {b->b.x - b->a.x, b->b.y - b->a.y};
+    double length2 = way.x * way.x + way.y * way.y, beside = BESIDE * sqrt(length2);
+    for (int i = 0; i < clip->piece_count; i++) {
+        const bst_point2 *p = clip->points + clip->pieces[i].first;
+        for (int k = 0, count = clip->pieces[i].count; k < count; k++) {
+            bst_point2 c = p[k], d = p[k + 1 < count ? k + 1 : 0];
+            if (fabs(left_of(b->a, way, c)) > beside || fabs(left_of(b->a, way, d)) > beside) {
+                continue;
+            }
+            double u = ((c.x - b->a.x) * way.x + (c.y - b->a.y) * way.y) / length2;
+            double v = ((d.x - b->a.x) * way.x + (d.y - b->a.y) * way.y) / length2;
+            double low = fmax(fmin(u, v), part[0]), high = fmin(fmax(u, v), part[1]);
+            if (low < high) {
+                t[0] = fmin(t[0], low);
+                t[1] = fmax(t[1], high);
+            }
+        }
+    }
+}
+
+/* Sets the side of a facet on which an end of a line is. */
+static void find_side(const bst_facet_layers *l, int facet, const bst_layers_outline *own,
+                      bst_layers_end *end, int k) {
+    end->side[k] = (bst_point2){0.0, 0.0};
+    end->beside[k] = -1;
+    for (int i = 0; i < own->count; i++) {
+        bst_point2 a = own->p[i], b = own->p[i + 1 < own->count ? i + 1 : 0];
+        bst_point2 way = {b.x - a.x, b.y - a.y};
+        if (fabs(left_of(a, way, end->place[k])) <= BESIDE * hypot(way.x, way.y)) {
+            /* corners of the net are in the other order */
+            int corner = (2 * own->count - 2 - i) % own->count;
+            end->side[k] = way;
+            end->beside[k] = l->net->beside[l->net->first[facet] + corner];
+        }
+    }
+}
+
+int bst_facet_layers_ends(const bst_facet_layers *l, int facet, bst_layers_end *out) {
     bst_layers_outline own;
-    int borders[BORDERS];
-    double plane[3], gap = 0.0;
+    int borders[BST_LAYERS_ENDS], ends = 0;
+    double plane[3];
     if (!bst_facet_layers_plane(l, facet, plane)) {
-        return 0.0;
+        return 0;
     }
     make_outline(l, facet, &own);
-    int count = bst_facet_borders_before(l, &l->boxes[facet], &own, plane, borders, BORDERS);
-    if (count < 0) {
-        return UINT16_MAX / l->level_per;
-    }
+    int count =
+        bst_facet_borders_before(l, &l->boxes[facet], &own, plane, borders, BST_LAYERS_ENDS);
     for (int n = 0; n < count; n++) {
         const bst_layers_border *b = &l->borders[borders[n]];
-        double t[2];
-        if (bst_facet_borders_part(own.p, own.count, b->a, b->b, t) != BST_LAYERS_PLACE_CROSSING) {
-            continue;
+        double part[2], t[2] = {1.0, 0.0};
+        if (bst_facet_borders_part(own.p, own.count, b->a, b->b, part) ==
+            BST_LAYERS_PLACE_CROSSING) {
+            find_ends(&l->clip, b, part, t);
         }
-        for (int i = 0; i < 2; i++) {
+        bst_layers_end *end = &out[ends];
+        *end = (bst_layers_end){.gap = 0.0};
+        for (int i = 0; i < 2 && t[0] < t[1]; i++) {
             double x = b->a.x + t[i] * (b->b.x - b->a.x), y = b->a.y + t[i] * (b->b.y - b->a.y);
             double near = b->near[0] + t[i] * (b->near[1] - b->near[0]);
-            gap = fmax(gap, near - plane[0] - plane[1] * x - plane[2] * y);
+            end->place[i] = (bst_point2){x, y};
+            find_side(l, facet, &own, end, i);
+            end->gap = fmax(end->gap, near - plane[0] - plane[1] * x - plane[2] * y);
         }
+        ends += end->gap > 0.0;
     }
-    return gap;
+    return count < 0 ? -1 : ends;
 }

@@ -105,9 +105,23 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *layers,
  *            counter-clockwise */
 bool bst_facet_layers_cut(bst_facet_layers *layers, int facet);
 
-/* How much nearer than a facet the borders are that cross it, at most: where their shadows end.
- * More than there is room for count as the extent of the model. */
-double bst_facet_layers_gap(const bst_facet_layers *layers, int facet);
+/* Where what is left of a facet ends at a nearer border: both ends of that line, how much nearer
+ * the border is at most, and the sides of the facet that the line ends at: their directions in the
+ * view and the facets beside them; 0 and -1: at none. */
+typedef struct bst_layers_end {
+    bst_point2 place[2], side[2];
+    int beside[2];
+    double gap;
+} bst_layers_end;
+
+/* Room for the lines of a facet. */
+enum { BST_LAYERS_ENDS = 256 };
+
+/* Lists the lines at which bst_facet_layers_cut has cut a facet, the last one that it was called
+ * for.
+ *
+ * Returned:  out  [BST_LAYERS_ENDS]; their number is the return value; below 0: there are more */
+int bst_facet_layers_ends(const bst_facet_layers *layers, int facet, bst_layers_end *out);
 
 /* Plane of a facet in the view: near = out[0] + out[1] x + out[2] y. False: it has no area. */
 bool bst_facet_layers_plane(const bst_facet_layers *layers, int facet, double out[3]);

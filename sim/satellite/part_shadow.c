@@ -7,6 +7,11 @@
 
 /* Parts reach beyond the corners of their facet by less than this share of the facet's size. */
 static const double BEYOND = 0.1;
+/* Sides of the polygon with the area of a rim's circle. */
+enum { RIM_SIDES = 96 };
+/* Corners of parts at a rim are beyond its circle by this share at most: of parts of 0.05 rad, so
+ * that their polygon has the area of the circle, by 2.1e-4. */
+static const double BESIDE_RIM = 3e-4;
 
 bool bst_part_shadow_hiders(bst_satellite_pose *p, int view, int facet, uint64_t *hiders) {
     const bst_satellite *s = p->satellite;
@@ -39,14 +44,33 @@ bool bst_part_shadow_hiders(bst_satellite_pose *p, int view, int facet, uint64_t
     return true;
 }
 
-/* Keeps what light reaches through the rim of the shell that the part is in. */
-static void look_through_rim(bst_satellite_pose *p, const bst_pose_view *v, int index) {
-    const bst_shell *shell = &p->satellite->shells[index];
-    if (!(bst_vec3_dot(bst_pose_shell_axis(p, index), v->z) > 0.0)) {
+/* Keeps what light reaches through the rim of the shell that the part is in: a circle, as the parts
+ * are those of the round surface. The rim of the model's facets would take from parts beside it. */
+static void look_through_rim(bst_satellite_pose *p, const bst_pose_view *v, int index,
+                             const bst_vec3 *corner, int count) {
+    bst_pose_rim rim = bst_pose_rim_of(p, v, index);
+    double radius_m = p->satellite->shells[index].radius_m;
+    bool within = rim.rate > 0.0;
+    rim.inner_m = (1.0 + BESIDE_RIM) * radius_m;
+    for (int i = 0; i < count && within; i++) {
+        within = bst_pose_is_within_rim(v, &rim, corner[i]);
+    }
+    if (within) {
+        return;
+    }
+    if (!(rim.rate > 0.0)) {
         p->clip.piece_count = 0;
         return;
     }
-    bst_polygon_clip_intersect(&p->clip, v->flat + shell->first_rim, shell->rim_count);
+    bst_point2 circle[RIM_SIDES];
+    bst_vec3 x = bst_vec3_perpendicular(rim.axis), y = bst_vec3_cross(rim.axis, x);
+    double side = 2.0 * BST_PI / RIM_SIDES, r = radius_m * sqrt(side / sin(side));
+    for (int i = 0; i < RIM_SIDES; i++) {
+        bst_vec3 q = bst_vec3_axpy(rim.centre, r * cos(side * i), x);
+        q = bst_vec3_axpy(q, r * sin(side * i), y);
+        circle[i] = (bst_point2){bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y)};
+    }
+    bst_polygon_clip_intersect(&p->clip, circle, RIM_SIDES);
 }
 
 double bst_part_shadow_lit(bst_satellite_pose *p, int view, int facet, uint64_t hiders,
@@ -75,7 +99,7 @@ double bst_part_shadow_lit(bst_satellite_pose *p, int view, int facet, uint64_t 
             continue;
         }
         if (o == f->occluder) {
-            look_through_rim(p, v, s->occluders[o].shell);
+            look_through_rim(p, v, s->occluders[o].shell, corner, count);
             continue;
         }
         /* where bodies are separate, rays lead toward this one: see bst_pose_look */

@@ -167,6 +167,44 @@ static bst_status look_from_light(bst_ctx *ctx, const bst_resolved_adding *a, in
     return bst_facet_layers_find(ctx, l, s->wanted);
 }
 
+/* Point of a facet at a place of the view from a light, body frame.
+ *
+ * Given:     plane  of the facet: bst_facet_layers_plane */
+static bst_vec3 place_on(const bst_resolved_light_view *v, const double plane[3], bst_point2 p) {
+    bst_vec3 at = bst_vec3_scale(v->z, plane[0] + plane[1] * p.x + plane[2] * p.y);
+    at = bst_vec3_axpy(at, (p.x - v->middle) / v->per_m, v->x);
+    return bst_vec3_axpy(at, (p.y - v->middle) / v->per_m, v->y);
+}
+
+/* Keeps the widths of the penumbrae on a facet of which the Sun reaches a part. */
+static void note_shadows(const bst_resolved_adding *a, int facet, const bst_resolved_light_view *v,
+                         double light) {
+    const bst_resolved_areas *s = &a->r->areas;
+    bst_layers_end end[BST_LAYERS_ENDS];
+    double plane[3];
+    bst_resolved_border border = {.normal = s->planes[facet].normal, .light = light};
+    int count = bst_facet_layers_ends(&s->lit[0], facet, end);
+    if (count < 0) {
+        border.at[0] = border.at[1] = s->middles[facet];
+        border.gap_m = 2.0 * a->r->satellite->radius_m;
+        bst_resolved_note_shadow(a, &border);
+    }
+    for (int i = 0; i < count && bst_facet_layers_plane(&s->lit[0], facet, plane); i++) {
+        border.gap_m = end[i].gap;
+        for (int k = 0; k < 2; k++) {
+            bst_point2 p = end[i].place[k], way = end[i].side[k];
+            int beside = end[i].beside[k];
+            border.at[k] = place_on(v, plane, p);
+            bst_vec3 next = place_on(v, plane, (bst_point2){p.x + way.x, p.y + way.y});
+            border.side[k] = bst_vec3_sub(next, border.at[k]);
+            /* the shadow goes on there if it is lit */
+            bool lit = beside >= 0 && s->eye.facing[beside] && s->lit[0].facing[beside];
+            border.change[k] = lit ? fmin(fabs(light - s->from[0][beside]), light) : light;
+        }
+        bst_resolved_note_shadow(a, &border);
+    }
+}
+
 /* Adds the light of what a light reaches of a facet.
  *
  * Given:     whole  nothing hides the facet from the observer; else eye.clip has what is seen */
@@ -183,10 +221,7 @@ static void add_lit(const bst_resolved_adding *a, int facet, int n,
     for (int i = 0; i < lit->piece_count; i++) {
         const bst_polygon_piece *piece = &lit->pieces[i];
         for (int k = 0; k < piece->count; k++) {
-            bst_point2 p = lit->points[piece->first + k];
-            bst_vec3 at = bst_vec3_scale(v->z, plane[0] + plane[1] * p.x + plane[2] * p.y);
-            at = bst_vec3_axpy(at, (p.x - v->middle) / v->per_m, v->x);
-            at = bst_vec3_axpy(at, (p.y - v->middle) / v->per_m, v->y);
+            bst_vec3 at = place_on(v, plane, lit->points[piece->first + k]);
             corner[k] = bst_resolved_project(a, at, &depth_m);
         }
         if (whole) {
@@ -223,9 +258,7 @@ static double add_facet(const bst_resolved_adding *a, int facet,
             even += light;
         } else {
             if (n == 0 && a->light->penumbrae && !bst_polygon_clip_is_empty(&s->lit[0].clip)) {
-                double gap_m = bst_facet_layers_gap(&s->lit[0], facet);
-                bst_resolved_note_shadow(a, s->planes[facet].normal, s->middles[facet], light,
-                                         gap_m);
+                note_shadows(a, facet, &views[0], light);
             }
             add_lit(a, facet, n, &views[n], whole, weight * light);
         }

@@ -292,7 +292,9 @@ static bst_status add_lit_part(bst_ctx *ctx, const bst_resolved_adding *a, const
         lit = split ? 1.0 : fraction;
     }
     if (split && a->light->penumbrae) {
-        bst_resolved_note_shadows_on(a, p->facet, s.sun);
+        bst_vec3 normal =
+            bst_curved_facet_normal(&p->c, (place[0] + 0.5) / all[0], (place[1] + 0.5) / all[1]);
+        bst_resolved_note_shadows_on(a, p->facet, middle, normal, s.sun, p->by_part);
     }
     s.sun *= lit;
     s.sun_change[0] *= lit;

@@ -401,7 +401,7 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
             lit = bst_resolved_lit_fraction(a, facet, view);
         }
         if (view == 0 && lit > 0.0 && lit < 1.0 && a->light->penumbrae) {
-            bst_resolved_note_shadows_on(a, facet, s.sun);
+            bst_resolved_note_shadows_on(a, facet, middle, normal, s.sun, false);
         }
         if (lit >= 1.0) {
             s.uniform += light[view];

@@ -126,18 +126,27 @@ void bst_resolved_note_light(const bst_resolved_adding *a, const bst_resolved_sh
 /* Direction of the point of the Sun's disc that casts the shadows. */
 bst_vec3 bst_resolved_shadow_sun(const bst_resolved_light *light);
 
-/* Keeps the width of the penumbrae on a facet for bst_resolved_image.
- *
- * Given:     normal  unit, body frame
- *            place   on the facet, body frame
- *            light   sunlight per cell
- *            gap_m   along the light, from the facet to what casts the shadow */
-void bst_resolved_note_shadow(const bst_resolved_adding *a, bst_vec3 normal, bst_vec3 place,
-                              double light, double gap_m);
+/* A line at which a shadow ends on a facet, body frame. */
+typedef struct bst_resolved_border {
+    bst_vec3 normal;  /* of the facet, unit */
+    bst_vec3 at[2];   /* its ends; the same: of any direction */
+    bst_vec3 side[2]; /* along the sides of the facet that it ends at; 0: none */
+    double light;     /* sunlight per cell */
+    double change[2]; /* of the light across these sides, per cell */
+    double gap_m;     /* along the light, from the facet to what casts the shadow, at most */
+} bst_resolved_border;
 
-/* The same for a plane or curved facet of which the Sun reaches a part, by the outlines of the
- * bodies that may shadow it. */
-void bst_resolved_note_shadows_on(const bst_resolved_adding *a, int facet, double light);
+/* Keeps the width of a penumbra for bst_resolved_image. */
+void bst_resolved_note_shadow(const bst_resolved_adding *a, const bst_resolved_border *border);
+
+/* The same for a plane or curved facet, or a part of it, of which the Sun reaches the pieces in
+ * pose->clip, by the outlines of the bodies at which these end.
+ *
+ * Given:     place, normal  of the plane, body frame
+ *            flat  the pieces are along the x and y of the view from the Sun; false: along the
+ *                  facet's axes */
+void bst_resolved_note_shadows_on(const bst_resolved_adding *a, int facet, bst_vec3 place,
+                                  bst_vec3 normal, double light, bool flat);
 
 /* Fraction of a facet that a light reaches; the pieces are in pose->clip if it is between 0 and 1.
  *

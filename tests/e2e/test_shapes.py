@@ -5,6 +5,7 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_shapes.py BORES
 """
 import csv
 import io
+import json
 import os
 import struct
 import subprocess
@@ -81,6 +82,35 @@ class Shapes(unittest.TestCase):
         shown = boresight("lightcurve", "scenarios/neossat_geo_track.json", "--duration", "60", "--step", "20")
         self.assertEqual(shown.returncode, 0, shown.stderr)
         self.assertEqual(len(shown.stdout.splitlines()), 5)
+
+    def test_scenes_without_shapes(self):
+        """A shape that is out of the field, and the files of its model, change no byte of the frames."""
+        elements = {"source": "keplerian", "semi_major_axis_m": 42164170, "eccentricity": 0, "inclination_deg": 0,
+                    "raan_deg": 0, "arg_perigee_deg": 0}
+        other = {"name": "other", "area_m2": 4, "albedo": 0.25}
+        shape = {"brightness": {"model": "shape"}, "shape": {"file": os.path.abspath(SATELLITE)},
+                 "attitude": [{"law": "nadir"}]}
+        with open("scenarios/neossat_geo_track.json", encoding="utf-8") as file:
+            scenario = json.load(file)
+        scenario["world"]["objects"][0]["orbit"]["elements_file"] = os.path.abspath("scenarios/catalogue_2022-06.tle")
+        scenario["observers"][0]["orbit"]["elements_file"] = os.path.abspath("scenarios/catalogue_2022-06.tle")
+        del scenario["observers"][0]["sensors"][0]["modules"]["obsgen"]
+        frames = {}
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "scenario.json")
+            for anomaly in (0, 90, 180, 270):
+                other["orbit"] = {"source": "numerical", "state": {**elements, "true_anomaly_deg": anomaly}}
+                for name, objects in (("sphere", [other]), ("shape", [{**other, **shape}])):
+                    with open(path, "w", encoding="utf-8") as file:
+                        json.dump({**scenario, "world": {**scenario["world"],
+                                                         "objects": scenario["world"]["objects"] + objects}}, file)
+                    out = os.path.join(folder, name)
+                    runs.run(path, out, duration=3)
+                    with open(os.path.join(out, "frames.fits"), "rb") as file:
+                        frames[name] = file.read()
+                    subprocess.run(["rm", "-r", out], check=True)
+                self.assertGreater(len(frames["sphere"]), 1024 * 1024)
+                self.assertEqual(frames["sphere"], frames["shape"])
 
     def test_turntable_reads_its_own_glb(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -32,8 +32,8 @@ enum { BST_FILTER_LEVELS = 3 };
 /* Models of an IMM (0 quiet, 1 manoeuvring), or components of a mixture of association hypotheses
  * and levels of process noise. The state is their mean and covariance. */
 typedef struct bst_filter_models {
-    int count;  /* 0: the state is a single Gaussian */
-    int levels; /* BST_FILTER_LEVELS: components have levels, 0: they have none */
+    int count;           /* 0: the state is a single Gaussian */
+    int levels;          /* BST_FILTER_LEVELS: components have levels, 0: they have none */
     double unswitched_s; /* time since changes between levels were last taken into account */
     int level[BST_FILTER_COMPONENTS];
     bst_sky_state state[BST_FILTER_COMPONENTS];
