@@ -13,7 +13,8 @@ enum { SIDES_MAX = BST_SURFACE_SIDES_MAX };
 
 /* Widest panel of azimuth before it is halved, rad. */
 static const double PANEL_RAD = 0.7;
-/* Widest band of latitude, rad, and borders of bands about a lobe in its half widths. */
+/* Widest band of latitude, rad; and borders of bands about a lobe in its half widths, so that its
+ * light is linear in each to 2e-4 of all: tests/satellite/test_surface_shadow.c. */
 static const double BAND_RAD = BST_PI / 32.0;
 static const double LOBE_BANDS[] = {0.25, 0.5, 0.75, 1.0, 1.4,  1.9,  2.5,
                                     3.3,  4.4, 6.0,  8.5, 12.0, 17.0, 25.0};
@@ -101,7 +102,8 @@ static void make_bands(surface *w) {
     }
 }
 
-/* A chord of a meridian in a band, with the light of both its hemispheres' points. */
+/* The chord of a meridian in a band of a hemisphere, 1 or -1, with the light of a piece at both
+ * ends. */
 static bst_light_line chord(const surface *w, bst_vec3 outward, const band *b, double hemisphere,
                             const double weight[2]) {
     bst_vec3 end[2], z = bst_vec3_scale(w->on.z, hemisphere);
