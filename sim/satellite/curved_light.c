@@ -157,18 +157,20 @@ static double lambert_cone_light(const bst_curved *c, double diffuse, double rad
 typedef struct cone_waves {
     double radial, axial; /* of the normal */
     wave in, out;         /* cosines of incidence and reflection */
+    double peak;          /* azimuth of the half vector */
     breaks borders;       /* of panels, over a turn */
 } cone_waves;
 
 static cone_waves waves_of(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun,
-                           bst_vec3 observer, bool fine) {
+                           bst_vec3 observer) {
     double rise = c->top_radius_m - c->radius_m, slant = hypot(rise, c->length_m);
     cone_waves w = {.radial = c->side * c->length_m / slant, .axial = -c->side * rise / slant};
     w.in = wave_of(c, sun, w.radial, w.axial);
     w.out = wave_of(c, observer, w.radial, w.axial);
     wave half = wave_of(c, bst_vec3_add(sun, observer), w.radial, w.axial);
     double from = half.peak - BST_PI;
-    w.borders = panels(from, from + 2.0 * BST_PI, half.peak, bst_brdf_lobe_rad(brdf), fine);
+    w.peak = half.peak;
+    w.borders = panels(from, from + 2.0 * BST_PI, half.peak, bst_brdf_lobe_rad(brdf), true);
     add_zeros(&w.borders, w.in, from);
     add_zeros(&w.borders, w.out, from);
     bst_sort_few(w.borders.at, w.borders.count);
@@ -185,7 +187,7 @@ static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun
                                          -c->side * rise / slant, sun, observer);
     }
     double cosine = bst_vec3_dot(sun, observer);
-    cone_waves w = waves_of(c, brdf, sun, observer, true);
+    cone_waves w = waves_of(c, brdf, sun, observer);
     wave in = w.in, out = w.out;
     breaks b = w.borders;
     for (int p = 0; p + 1 < b.count; p++) {
@@ -220,17 +222,26 @@ static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun
 int bst_curved_panels(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun, bst_vec3 observer,
                       double (*panel)[2]) {
     int count = 0;
+    bool lobe = bst_brdf_lobe_rad(brdf) < 1.0; /* with a border in its middle */
     if (c->sphere) {
         double phase = bst_vec3_angle(sun, observer);
         breaks b =
-            panels(phase - 0.5 * BST_PI, 0.5 * BST_PI, 0.5 * phase, bst_brdf_lobe_rad(brdf), false);
+            panels(phase - 0.5 * BST_PI, 0.5 * BST_PI, 0.5 * phase, bst_brdf_lobe_rad(brdf), true);
+        if (lobe) {
+            add(&b, 0.5 * phase, phase - 0.5 * BST_PI, 0.5 * BST_PI);
+            bst_sort_few(b.at, b.count);
+        }
         for (; count + 1 < b.count; count++) {
             panel[count][0] = b.at[count];
             panel[count][1] = b.at[count + 1];
         }
         return count;
     }
-    cone_waves w = waves_of(c, brdf, sun, observer, false);
+    cone_waves w = waves_of(c, brdf, sun, observer);
+    if (lobe) {
+        add(&w.borders, w.peak, -INFINITY, INFINITY);
+        bst_sort_few(w.borders.at, w.borders.count);
+    }
     for (int p = 0; p + 1 < w.borders.count; p++) {
         double from = w.borders.at[p], to = w.borders.at[p + 1], middle = 0.5 * (from + to);
         if (wave_at(w.in, middle) > 0.0 && wave_at(w.out, middle) > 0.0) {

@@ -20,9 +20,10 @@ double bst_curved_light(const bst_curved *curved, const bst_brdf *brdf, bst_vec3
 void bst_sort_few(double *x, int count);
 
 /* Panels of such an integral, at most. */
-enum { BST_CURVED_PANELS_MAX = 16 };
+enum { BST_CURVED_PANELS_MAX = 20 };
 
-/* Ranges of azimuth in which a curved surface is lit and in sight, finer about the specular lobe.
+/* Ranges of azimuth in which a curved surface is lit and in sight, finer about the specular lobe,
+ * for three points in each.
  *
  * Given:     as bst_curved_light
  * Returned:  panel  [BST_CURVED_PANELS_MAX] lowest and highest azimuth about z from x, rad; of

@@ -25,9 +25,9 @@ typedef struct sums {
 } sums;
 
 /* Error of one panel of a shadow's integral, of all light. */
-static const double TOLERANCE = 6e-4;
-/* What polygons of 24 sides in place of circles do to the free area of a facet, of its area, at
- * most; and the error that it may have so, of all light. */
+static const double TOLERANCE = 4e-4;
+/* What polygons of 24 sides in place of circles do to the free area of a facet, of its area, but
+ * for few views (docs/results/satellites.md); and the error that it may have so, of all light. */
 static const double POLYGON_ERROR = 3e-3, POLYGON_TOLERANCE = 7e-4;
 
 /* The last facet whose reflection was computed: large plane faces consist of many. */
@@ -60,7 +60,7 @@ static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, in
     }
     if (area > 0.0 && area < f->area_m2 && bst_plane_is_round(p, index)) {
         error = POLYGON_ERROR * f->area_m2 * last->light;
-        if (s->round_count < ROUND_MAX) {
+        if (s->round_count < ROUND_MAX && bst_plane_has_lines(p, index)) {
             s->round[s->round_count].facet = index;
             s->round[s->round_count].area = area;
             s->round[s->round_count++].light = last->light;
@@ -140,7 +140,8 @@ static void add_curved(bst_satellite_pose *p, const bst_satellite_light *l, sums
             p->curved[i].share = 0.0;
             if (light > 0.0) {
                 p->curved[i].share = bst_curved_free_share(
-                    p, i, light / m->scale, TOLERANCE * (all / in_v), &p->curved[i].error);
+                    p, i, light / m->scale, bst_sun_disc_nodes(m, &s->disc) > 1,
+                    TOLERANCE * (all / in_v), &p->curved[i].error);
                 left += p->curved[i].share * in_v;
             }
         }

@@ -65,9 +65,10 @@ typedef struct bst_satellite_flux {
  * Notes:     shadows are those of the centre of the Sun, exact on plane facets unless a border is
  *            round. Curved surfaces are integrated without shadows and reduced by the part of their
  *            light that nothing hides (bst_curved_free_share); plane facets with a round border or
- *            a round hider likewise where they matter. `error` is a bound of what that costs.
- *            Shadows of earthlight are those of a
- * light at its centroid. Light that is reflected twice is left out. */
+ *            a round hider likewise where they matter. `error` is an estimate of what that costs,
+ *            no bound: docs/results/satellites.md has how often it is exceeded. Shadows of
+ *            earthlight are those of a light at its centroid. Light that is reflected twice is left
+ *            out. */
 void bst_satellite_flux_at(bst_satellite_pose *pose, const bst_satellite_light *light,
                            bst_satellite_flux *out);
 

@@ -9,6 +9,8 @@ enum { SPANS_MAX = 32 };
 
 /* Least cosine between the axis of a ring and the view: its ellipse is this thin at most. */
 static const double EDGE_ON = 1e-6;
+/* Angle of the arc that a corner of a polygon about a round body stands for, at most. */
+static const double SIDE_RAD = 0.25 * BST_PI;
 
 /* Free parts of a line, as fractions of its length. */
 typedef struct spans {
@@ -172,6 +174,14 @@ static void keep_behind_faces(const bst_satellite_pose *p, const bst_pose_view *
     }
 }
 
+/* Finds the tangents of a band's circles. */
+static void set_tangents(bst_round_band *b) {
+    double narrower = b->radius_m[0] - b->radius_m[1];
+    b->tangents = b->apart > fabs(narrower);
+    b->sine = b->tangents ? narrower / b->apart : 0.0;
+    b->cosine = sqrt((1.0 - b->sine) * (1.0 + b->sine));
+}
+
 /* A band in a view. */
 static bst_round_band band_of(const bst_pose_view *v, bst_vec3 base, bst_vec3 axis, double low_m,
                               double high_m, double length_m) {
@@ -184,9 +194,7 @@ static bst_round_band band_of(const bst_pose_view *v, bst_vec3 base, bst_vec3 ax
     }
     b.scale = 1.0 / greater_of(fabs(bst_vec3_dot(axis, v->z)), EDGE_ON);
     b.apart = length_m * across * b.scale;
-    b.tangents = b.apart > fabs(low_m - high_m);
-    b.sine = b.tangents ? (low_m - high_m) / b.apart : 0.0;
-    b.cosine = sqrt((1.0 - b.sine) * (1.0 + b.sine));
+    set_tangents(&b);
     return b;
 }
 
@@ -404,29 +412,55 @@ double bst_line_shadow_lost(const bst_line_shadow *w, const bst_light_line *of) 
     return lost_light(w, of);
 }
 
-int bst_line_shadow_corners(const bst_line_shadow *w, int view, int index, int room,
-                            bst_point2 *point) {
+/* A band about the silhouette of a round hider. The bowl of a shell, with the radius sqrt(t) at the
+ * height t of 1, is within a cone from half the radius to the rim: sqrt(t) <= 1/2 + t/2. */
+static bst_round_band band_about(const bst_line_shadow *w, const int hider[2]) {
+    int count = bands_of(w->pose, hider[0]);
+    const bst_round_band *first = w->bands + hider[1];
+    bst_round_band b = first[count - 1];
+    if (count > 1) {
+        double x = b.centre.x - first->centre.x, y = b.centre.y - first->centre.y;
+        b.apart += (x * b.along.x + y * b.along.y) * b.scale;
+        b.centre = first->centre;
+        b.radius_m[0] = 0.5 * b.radius_m[1];
+        set_tangents(&b);
+    }
+    return b;
+}
+
+/* Corners of a polygon about an arc of a band's circle, which its sides touch at both ends.
+ * Returned: their number. */
+static int corners_about(const bst_round_band *b, int circle, double from, double to,
+                         bst_point2 *point) {
+    int count = (int)greater_of(ceil((to - from) / SIDE_RAD - 1e-9), 1.0);
+    double half = 0.5 * (to - from) / count, r = b->radius_m[circle] / cos(half);
+    for (int i = 0; i < count; i++) {
+        double angle = from + (2 * i + 1) * half, across = r * sin(angle);
+        double along = (r * cos(angle) + circle * b->apart) / b->scale;
+        point[i] = (bst_point2){b->centre.x + along * b->along.x - across * b->along.y,
+                                b->centre.y + along * b->along.y + across * b->along.x};
+    }
+    return count;
+}
+
+int bst_line_shadow_corners(const bst_line_shadow *w, int view, int index, bst_point2 *point) {
     const int *hider = w->pose->hiders[index];
-    int n = 0;
     if (hider[1] < 0) {
         const bst_point2 *outline;
         int count = bst_pose_outline(w->pose, view, hider[0], &outline);
-        for (; n < count && n < room; n++) {
-            point[n] = outline[n];
+        int n = count < BST_LINE_CORNERS_MAX ? count : BST_LINE_CORNERS_MAX;
+        for (int i = 0; i < n; i++) {
+            point[i] = outline[i * count / n];
         }
         return n;
     }
-    /* hexagons about both ellipses of the last band, which is the widest one of a shell */
-    static const double x[] = {1.1547005383792515, 0.5773502691896258};
-    const bst_round_band *b = &w->bands[hider[1] + bands_of(w->pose, hider[0]) - 1];
-    for (int k = 0; k < 12 && n < room; k++) {
-        double r = b->radius_m[k / 6], at = k < 6 ? 0.0 : b->apart;
-        double along = (at + (k % 6 < 4 ? x[1] : x[0]) * (k % 2 ? r : -r)) / b->scale;
-        double across = k % 6 < 2 ? r : k % 6 < 4 ? -r : 0.0;
-        point[n++] = (bst_point2){b->centre.x + along * b->along.x - across * b->along.y,
-                                  b->centre.y + along * b->along.y + across * b->along.x};
+    bst_round_band b = band_about(w, hider);
+    if (!b.tangents) {
+        return corners_about(&b, b.radius_m[1] > b.radius_m[0], 0.0, 2.0 * BST_PI, point);
     }
-    return n;
+    double angle = acos(b.sine);
+    int n = corners_about(&b, 1, -angle, angle, point);
+    return n + corners_about(&b, 0, angle, 2.0 * BST_PI - angle, point + n);
 }
 
 bool bst_line_shadow_tangents(const bst_line_shadow *w, int index, bst_point2 tangent[2][2]) {

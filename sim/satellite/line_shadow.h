@@ -4,7 +4,7 @@
 
 #include "sim/satellite/pose.h"
 
-enum { BST_LINE_BANDS_MAX = 64 };
+enum { BST_LINE_BANDS_MAX = 64, BST_LINE_CORNERS_MAX = 40 };
 
 /* A truncated cone or a sphere in a view: the hull of two ellipses, in coordinates in which both
  * are circles. */
@@ -57,13 +57,14 @@ bool bst_line_shadow_make(bst_satellite_pose *pose, int body, bool inside,
  *            both in front of and behind them. */
 double bst_line_shadow_lost(const bst_line_shadow *shadow, const bst_light_line *line);
 
-/* Number of corners of a hider's silhouette, or of points that bound it if it is round, at most
- * `room`.
+/* Corners of a hider's silhouette, or of a polygon about it if it is round.
  *
  * Given:     view, index  of the list
- * Returned:  point  along the view's x and y */
-int bst_line_shadow_corners(const bst_line_shadow *shadow, int view, int index, int room,
-                            bst_point2 *point);
+ * Returned:  point  [BST_LINE_CORNERS_MAX] along the view's x and y, in order around it; the number
+ *                   is the return value
+ * Notes:     of silhouettes with more corners some are left out. Polygons about round bodies are up
+ *            to 8 % wider, about the bottom of shells more. */
+int bst_line_shadow_corners(const bst_line_shadow *shadow, int view, int index, bst_point2 *point);
 
 /* The two straight sides of a round hider's silhouette.
  *

@@ -106,8 +106,8 @@ static const bst_config_desc part_table[] = {
     BST_REAL(bst_satellite_part_config, length_m, "m", 0, 1e4, "1",
              "cylinder, cone: length along z; dish: depth."),
     BST_INT(bst_satellite_part_config, segments, "", 8, 96, "24",
-            "Facets around a curved part. Its own light is integrated over the curved surface; "
-            "shadows are those of the facets."),
+            "Facets around a curved part. Its light is integrated over the curved surface, with "
+            "round shadows; in images it casts the shadow of its facets."),
     BST_BOOL(bst_satellite_part_config, open, "false", "cylinder, cone: without end faces."),
     BST_PATH(bst_satellite_part_config, file, "\"\"",
              "mesh: Wavefront OBJ, glTF or GLB file, relative to the folder of the file that "

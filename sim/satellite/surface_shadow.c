@@ -1,131 +1,181 @@
 #include "sim/satellite/surface_shadow.h"
 
-#include "sim/satellite/curved_light.h"
-#include "sim/satellite/line_shadow.h"
-#include "sim/satellite/pose_view.h"
+#include <assert.h>
 
-enum {
-    PLACES_MAX = 64,
-    CHORDS = 16,
-    FEW_CORNERS = 8,
-    HIDER_CORNERS = 40,
-    HALVINGS = 9,
-    PLANE_PANELS = 12
-};
+#include "sim/satellite/curved_light.h"
+#include "sim/satellite/pose_view.h"
+#include "sim/satellite/surface_places.h"
+
+enum { BANDS_MAX = 32, LINES_MAX = 2 * BANDS_MAX, HALVINGS = 9, PLANE_PANELS = 12 };
 
 /* Facets with more corners, of bodies with curved surfaces, are ends of these. */
-enum { SIDES_MAX = 7 };
+enum { SIDES_MAX = BST_SURFACE_SIDES_MAX };
 
 /* Widest panel of azimuth before it is halved, rad. */
 static const double PANEL_RAD = 0.7;
+/* Widest band of latitude, rad; and borders of bands about a lobe in its half widths, so that its
+ * light is linear in each to 2e-4 of all: tests/satellite/test_surface_shadow.c. */
+static const double BAND_RAD = BST_PI / 32.0;
+static const double LOBE_BANDS[] = {0.25, 0.5, 0.75, 1.0, 1.4,  1.9,  2.5,
+                                    3.3,  4.4, 6.0,  8.5, 12.0, 17.0, 25.0};
 /* Error of a panel over its difference from the rule of the middle: a choice, see
  * docs/results/satellites.md. */
-static const double ERROR = 0.4;
-/* Borders nearer than this times the tolerance are one. */
-static const double NEAR = 0.3;
+static const double ERROR = 0.6;
+/* Borders nearer than this times the tolerance, or than this part of the range, are one. */
+static const double NEAR = 0.3, NEAREST = 0.02;
 /* Panels of surfaces that matter little are up to this wider. */
 static const double WIDEN = 2.0;
-/* Tolerance below which panels are not wider than that, and above which the corners of hiders do
- * not matter. */
-static const double FINE = 6e-4, COARSE = 2e-2;
+/* Tolerance below which panels are not wider than that. */
+static const double FINE = 6e-4;
 
-/* A surface in the body frame, with lines at the places of one coordinate: azimuth; of polygons the
- * distance along y. */
+/* A band of latitude of a sphere: its chord, and the two points of Gauss' quadrature in it. */
+typedef struct band {
+    double cosine[2], sine[2];                /* of its borders, times their distance over R */
+    double middle_cosine, middle_sine, width; /* width in rad */
+    double point_cosine[2];
+} band;
+
+/* A surface, with the light of its lines at each place. */
 typedef struct surface {
-    bst_line_shadow shadow;
-    bst_light_line (*line)(const struct surface *w, double place, int index);
-    int lines; /* at each place */
-    const bst_curved *curved;
+    bst_shaded_surface on;
+    int (*lines)(const struct surface *w, double place, bst_light_line *line); /* their number */
     const bst_brdf *brdf;
     bst_vec3 sun, observer;
-    bst_vec3 base, x, y, z; /* of a sphere: z is the axis of bst_curved_panels, x the observer; of a
-                               plane facet: z is its normal */
     double slant_m, radial, axial; /* of a cone: length of a line; of its normal */
-    double radius_m;               /* of a disc */
-    bst_point2 corner[SIDES_MAX];  /* of a polygon */
-    int corners;
-    double tolerance, share;  /* of one panel, in the unit of the integral; of the whole */
-    double narrow;            /* no shadow is sought within panels that are narrower */
-    double place[PLACES_MAX]; /* of the corners of hiders */
-    int places;
+    band bands[BANDS_MAX];         /* of a sphere, from the plane of Sun and observer to the pole */
+    int band_count;
+    double tolerance, share; /* of one panel, in the unit of the integral; of the whole */
+    double narrow;           /* no shadow is sought within panels that are narrower */
 } surface;
 
 /* BRDF times both cosines. */
-static double reflected(const surface *w, bst_vec3 normal) {
-    double in = fmin(bst_vec3_dot(normal, w->sun), 1.0);
-    double out = fmin(bst_vec3_dot(normal, w->observer), 1.0);
+static double reflected(const surface *w, double in, double out) {
+    in = fmin(in, 1.0);
+    out = fmin(out, 1.0);
     return in > 0.0 && out > 0.0
                ? in * out * bst_brdf_value(w->brdf, in, out, bst_vec3_dot(w->sun, w->observer))
                : 0.0;
 }
 
 static bst_vec3 outward_at(const surface *w, double azimuth) {
-    return bst_vec3_axpy(bst_vec3_scale(w->x, cos(azimuth)), sin(azimuth), w->y);
+    return bst_vec3_axpy(bst_vec3_scale(w->on.x, cos(azimuth)), sin(azimuth), w->on.y);
 }
 
-static bst_light_line cone_line(const surface *w, double azimuth, int index) {
-    const bst_curved *c = w->curved;
-    bst_vec3 outward = outward_at(w, azimuth), top = bst_vec3_axpy(w->base, c->length_m, w->z);
-    (void)index;
-    bst_light_line l = {.from = bst_vec3_axpy(w->base, c->radius_m, outward),
-                        .to = bst_vec3_axpy(top, c->top_radius_m, outward)};
-    l.normal = bst_vec3_axpy(bst_vec3_scale(outward, w->radial), w->axial, w->z);
-    double value = reflected(w, l.normal) * w->slant_m;
-    l.from_weight = value * c->radius_m;
-    l.to_weight = value * c->top_radius_m;
-    return l;
+static int cone_lines(const surface *w, double azimuth, bst_light_line *line) {
+    const bst_curved *c = w->on.curved;
+    bst_vec3 outward = outward_at(w, azimuth);
+    bst_vec3 top = bst_vec3_axpy(w->on.base, c->length_m, w->on.z);
+    bst_vec3 normal = bst_vec3_axpy(bst_vec3_scale(outward, w->radial), w->axial, w->on.z);
+    double in = bst_vec3_dot(normal, w->sun), out = bst_vec3_dot(normal, w->observer);
+    double value = reflected(w, in, out) * w->slant_m;
+    *line = (bst_light_line){.from = bst_vec3_axpy(w->on.base, c->radius_m, outward),
+                             .to = bst_vec3_axpy(top, c->top_radius_m, outward),
+                             .normal = normal,
+                             .from_weight = value * c->radius_m,
+                             .to_weight = value * c->top_radius_m};
+    return 1;
 }
 
-/* Chords that end outside of the sphere, so that their circle has its area. */
-static bst_light_line sphere_line(const surface *w, double azimuth, int index) {
-    const double step = BST_PI / CHORDS;
-    double r = w->curved->radius_m, far = r * sqrt(step / sin(step));
-    double middle = (index + 0.5) * step - 0.5 * BST_PI;
-    bst_vec3 outward = outward_at(w, azimuth), end[2];
-    for (int i = 0; i < 2; i++) {
-        double latitude = middle + (i - 0.5) * step;
-        end[i] = bst_vec3_axpy(w->base, far * cos(latitude), outward);
-        end[i] = bst_vec3_axpy(end[i], far * sin(latitude), w->z);
+/* Divides a hemisphere into bands of latitude, finer about the lobe. */
+static void make_bands(surface *w) {
+    const int steps = sizeof LOBE_BANDS / sizeof *LOBE_BANDS;
+    double lobe = bst_brdf_lobe_rad(w->brdf), from = 0.0;
+    for (int i = lobe < 1.0 ? 0 : steps; i <= steps && from < 0.5 * BST_PI; i++) {
+        double to = i < steps ? fmin(LOBE_BANDS[i] * lobe, 0.5 * BST_PI) : 0.5 * BST_PI;
+        int parts = (int)ceil((to - from) / BAND_RAD - 1e-9);
+        double width = (to - from) / parts;
+        for (int k = 0; k < parts && w->band_count < BANDS_MAX; k++) {
+            band *b = &w->bands[w->band_count++];
+            double low = from + k * width, middle = low + 0.5 * width;
+            /* chords that end outside of the sphere, so that their circle has its area */
+            double far = sqrt(width / sin(width));
+            b->width = width;
+            b->middle_cosine = cos(middle);
+            b->middle_sine = sin(middle);
+            for (int side = 0; side < 2; side++) {
+                b->cosine[side] = far * cos(low + side * width);
+                b->sine[side] = far * sin(low + side * width);
+                b->point_cosine[side] = cos(middle + (side - 0.5) * width / sqrt(3.0));
+            }
+        }
+        from = to;
     }
-    bst_light_line l = {.from = end[0], .to = end[1]};
-    l.normal = bst_vec3_axpy(bst_vec3_scale(outward, cos(middle)), sin(middle), w->z);
-    l.from_weight = l.to_weight = reflected(w, l.normal) * r * r * step * cos(middle);
-    return l;
+}
+
+/* The chord of a meridian in a band of a hemisphere, 1 or -1, with the light of a piece at both
+ * ends. */
+static bst_light_line chord(const surface *w, bst_vec3 outward, const band *b, double hemisphere,
+                            const double weight[2]) {
+    bst_vec3 end[2], z = bst_vec3_scale(w->on.z, hemisphere);
+    double r = w->on.curved->radius_m;
+    for (int i = 0; i < 2; i++) {
+        end[i] = bst_vec3_axpy(w->on.base, r * b->cosine[i], outward);
+        end[i] = bst_vec3_axpy(end[i], r * b->sine[i], z);
+    }
+    return (bst_light_line){
+        .from = end[0],
+        .to = end[1],
+        .normal = bst_vec3_axpy(bst_vec3_scale(outward, b->middle_cosine), b->middle_sine, z),
+        .from_weight = weight[0],
+        .to_weight = weight[1]};
+}
+
+/* Light is linear in each band, through its two points but below 0 nowhere. */
+static int sphere_lines(const surface *w, double azimuth, bst_light_line *line) {
+    bst_vec3 outward = outward_at(w, azimuth);
+    double in = bst_vec3_dot(outward, w->sun), out = bst_vec3_dot(outward, w->observer);
+    double r = w->on.curved->radius_m;
+    for (int i = 0; i < w->band_count; i++) {
+        const band *b = &w->bands[i];
+        double value[2], weight[2];
+        for (int k = 0; k < 2; k++) {
+            double cosine = b->point_cosine[k];
+            value[k] = reflected(w, in * cosine, out * cosine) * cosine * r * r * b->width;
+        }
+        double mean = 0.5 * (value[0] + value[1]), slope = 0.5 * sqrt(3.0) * (value[1] - value[0]);
+        slope = fmax(fmin(slope, mean), -mean);
+        weight[0] = mean - slope;
+        weight[1] = mean + slope;
+        line[2 * i] = chord(w, outward, b, 1.0, weight);
+        line[2 * i + 1] = chord(w, outward, b, -1.0, weight);
+    }
+    return 2 * w->band_count;
 }
 
 static bst_vec3 point_of(const surface *w, double x, double y) {
-    return bst_vec3_axpy(bst_vec3_axpy(w->base, x, w->x), y, w->y);
+    return bst_vec3_axpy(bst_vec3_axpy(w->on.base, x, w->on.x), y, w->on.y);
 }
 
 /* Chords along x at -R cos(azimuth) of y: smooth at both ends. */
-static bst_light_line disc_line(const surface *w, double azimuth, int index) {
-    double half = w->radius_m * sin(azimuth), y = -w->radius_m * cos(azimuth);
-    (void)index;
-    return (bst_light_line){.from = point_of(w, -half, y),
-                            .to = point_of(w, half, y),
-                            .normal = w->z,
-                            .from_weight = 2.0 * half * half,
-                            .to_weight = 2.0 * half * half};
+static int disc_lines(const surface *w, double azimuth, bst_light_line *line) {
+    double half = w->on.radius_m * sin(azimuth), y = -w->on.radius_m * cos(azimuth);
+    *line = (bst_light_line){.from = point_of(w, -half, y),
+                             .to = point_of(w, half, y),
+                             .normal = w->on.z,
+                             .from_weight = 2.0 * half * half,
+                             .to_weight = 2.0 * half * half};
+    return 1;
 }
 
-static bst_light_line polygon_line(const surface *w, double y, int index) {
+static int polygon_lines(const surface *w, double y, bst_light_line *line) {
     double low = INFINITY, high = -INFINITY;
-    (void)index;
-    for (int i = 0; i < w->corners; i++) {
-        bst_point2 a = w->corner[i], b = w->corner[i + 1 < w->corners ? i + 1 : 0];
+    for (int i = 0; i < w->on.corners; i++) {
+        bst_point2 a = w->on.corner[i], b = w->on.corner[i + 1 < w->on.corners ? i + 1 : 0];
         if ((a.y > y) != (b.y > y)) {
             double x = a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x);
             low = fmin(low, x);
             high = fmax(high, x);
         }
     }
-    bst_light_line l = {.normal = w->z};
-    if (low < high) {
-        l.from = point_of(w, low, y);
-        l.to = point_of(w, high, y);
-        l.from_weight = l.to_weight = high - low;
+    if (!(low < high)) {
+        return 0;
     }
-    return l;
+    *line = (bst_light_line){.from = point_of(w, low, y),
+                             .to = point_of(w, high, y),
+                             .normal = w->on.z,
+                             .from_weight = high - low,
+                             .to_weight = high - low};
+    return 1;
 }
 
 /* Light at one place, or the integral over places. */
@@ -133,15 +183,17 @@ typedef struct light {
     double all, lost;
     double place;             /* last one of the last panel; of a sum only */
     double share, slope, end; /* lost there, its slope, and the panel's end */
+    bool skipped;             /* a border was passed over because another one is near */
 } light;
 
 static light light_at(const surface *w, double place) {
+    bst_light_line line[LINES_MAX];
     light sum = {.all = 0.0};
-    for (int i = 0; i < w->lines; i++) {
-        bst_light_line l = w->line(w, place, i);
-        double all = 0.5 * (l.from_weight + l.to_weight);
+    int count = w->lines(w, place, line);
+    for (int i = 0; i < count; i++) {
+        double all = 0.5 * (line[i].from_weight + line[i].to_weight);
         sum.all += all;
-        sum.lost += all > 0.0 ? bst_line_shadow_lost(&w->shadow, &l) : 0.0;
+        sum.lost += all > 0.0 ? bst_line_shadow_lost(&w->on.shadow, &line[i]) : 0.0;
     }
     return sum;
 }
@@ -176,14 +228,15 @@ static double mend_jump(const surface *w, double from, double first_place, doubl
 }
 
 /* Adds a panel by three-point Gauss quadrature. Returned: its difference from the rule of the
- * middle, times ERROR. */
+ * middle for the share that is lost, times ERROR. */
 static double add_panel(const surface *w, double from, double to, int halvings, light *sum) {
     double half = 0.5 * (to - from), middle = from + half, aside = half * sqrt(0.6);
     light a = light_at(w, middle - aside), m = light_at(w, middle), b = light_at(w, middle + aside);
     bool none = !(a.lost > 0.0 || b.lost > 0.0 || m.lost > 0.0);
     bool all = a.lost >= a.all && b.lost >= b.all && m.lost >= m.all;
+    double others = a.lost + b.lost - lost_share(&m) * (a.all + b.all);
 
-    double error = none || all ? 0.0 : ERROR * half * fabs(a.lost + b.lost - 2.0 * m.lost);
+    double error = none || all ? 0.0 : ERROR * half * fabs(others);
     if ((error > w->tolerance || ((none || all) && to - from > w->narrow)) && halvings > 0) {
         return add_panel(w, from, middle, halvings - 1, sum) +
                add_panel(w, middle, to, halvings - 1, sum);
@@ -200,192 +253,17 @@ static double add_panel(const surface *w, double from, double to, int halvings, 
     return error;
 }
 
-/* Azimuths where a ray of a view meets a curved surface; a cone is continued beyond its ends if
- * `beyond`.
- *
- * Given:     r  a point of the ray, from the base
- * Returned:  their number */
-static int meet_curved(const surface *w, const bst_pose_view *v, bst_vec3 r, bool beyond,
-                       double place[2]) {
-    const bst_curved *c = w->curved;
-    double k = c->sphere ? 0.0 : (c->top_radius_m - c->radius_m) / c->length_m;
-    double rx = bst_vec3_dot(r, w->x), ry = bst_vec3_dot(r, w->y), rz = bst_vec3_dot(r, w->z);
-    double dx = bst_vec3_dot(v->z, w->x), dy = bst_vec3_dot(v->z, w->y);
-    double dz = bst_vec3_dot(v->z, w->z), radius = c->radius_m + k * rz;
-    double a = dx * dx + dy * dy - k * k * dz * dz, b = rx * dx + ry * dy - radius * k * dz;
-    double constant = rx * rx + ry * ry - radius * radius;
-    if (c->sphere) {
-        a += dz * dz;
-        b += rz * dz;
-        constant += rz * rz;
-    }
-    double root = b * b - a * constant;
-    int n = 0;
-    /* what the view sees is the near side, of inner surfaces the far one */
-    for (int side = -1; side <= 1 && root > 0.0 && fabs(a) > 1e-12; side += 2) {
-        if (a > 0.0 && side * c->side < 0.0) {
-            continue;
-        }
-        double t = (-b + side * sqrt(root)) / a;
-        double height = rz + t * dz;
-        if (beyond || c->sphere || (height >= 0.0 && height <= c->length_m)) {
-            place[n++] = atan2(ry + t * dy, rx + t * dx);
-        }
-    }
-    return n;
-}
-
-/* The same azimuth, from `start` on. */
-static double turned_to(double azimuth, double start) {
-    double turn = azimuth - start;
-    return start + turn - 2.0 * BST_PI * floor(turn / (2.0 * BST_PI));
-}
-
-/* Places, from `start` on, where the ray of a view through a point of its plane meets the surface
- * or its continuation. Returned: their number. */
-static int meet(const surface *w, const bst_pose_view *v, bst_point2 point, bool beyond,
-                double start, double place[2]) {
-    bst_vec3 q = bst_vec3_axpy(bst_vec3_scale(v->x, point.x), point.y, v->y);
-    bst_vec3 r = bst_vec3_sub(q, w->base);
-    if (w->curved) {
-        int n = meet_curved(w, v, r, beyond, place);
-        for (int i = 0; i < n; i++) {
-            place[i] = turned_to(place[i], start);
-        }
-        return n;
-    }
-    r = bst_vec3_axpy(r, -bst_vec3_dot(r, w->z) / bst_vec3_dot(v->z, w->z), v->z);
-    double y = bst_vec3_dot(r, w->y);
-    if (w->corners == 0 && !(fabs(y) < w->radius_m)) {
-        return 0;
-    }
-    place[0] = w->corners == 0 ? acos(-y / w->radius_m) : y;
-    return 1;
-}
-
-static void add_place(surface *w, double place) {
-    if (w->places < PLACES_MAX) {
-        w->place[w->places++] = place;
-    }
-}
-
-/* Adds the azimuths between two where an end of a cone crosses an edge of a silhouette. */
-static void add_crossings(surface *w, const bst_pose_view *v, bst_point2 p, bst_point2 q,
-                          double start, double end) {
-    bst_point2 d = {q.x - p.x, q.y - p.y};
-    double length2 = d.x * d.x + d.y * d.y;
-    double xx = bst_vec3_dot(w->x, v->x), xy = bst_vec3_dot(w->x, v->y);
-    double yx = bst_vec3_dot(w->y, v->x), yy = bst_vec3_dot(w->y, v->y);
-    for (int i = 0; i < 2; i++) {
-        double radius = i == 0 ? w->curved->radius_m : w->curved->top_radius_m;
-        bst_vec3 centre = bst_vec3_axpy(w->base, i * w->curved->length_m, w->z);
-        double x = bst_vec3_dot(centre, v->x) - p.x, y = bst_vec3_dot(centre, v->y) - p.y;
-        double a = radius * (d.x * xy - d.y * xx), b = radius * (d.x * yy - d.y * yx);
-        double c = d.x * y - d.y * x, height2 = a * a + b * b, root = height2 - c * c;
-        for (int side = -1; side <= 1 && root > 0.0; side += 2) {
-            double s = side * sqrt(root);
-            double cosine = (-a * c - b * s) / height2, sine = (-b * c + a * s) / height2;
-            double along = d.x * (x + radius * (cosine * xx + sine * yx)) +
-                           d.y * (y + radius * (cosine * xy + sine * yy));
-            if (along > 0.0 && along < length2) {
-                double place = turned_to(atan2(sine, cosine), start);
-                if (place < end) {
-                    add_place(w, place);
-                }
-            }
-        }
-    }
-}
-
-/* Adds the azimuths between two where the shadow of a shell's rim crosses an end of a band within
- * it: circles in the plane of the rim, along the view. */
-static void add_rim_crossings(surface *w, const bst_pose_view *v, double start, double end) {
-    const bst_satellite_pose *p = w->shadow.pose;
-    int shell = p->satellite->occluders[w->curved->occluder].shell;
-    double radius = p->satellite->shells[shell].radius_m, lower = 0.0, middle = 0.0;
-    bst_pose_rim rim = bst_pose_rim_of(p, v, shell);
-    for (int i = 0; i < 2; i++) {
-        double ring = i == 0 ? w->curved->radius_m : w->curved->top_radius_m;
-        bst_vec3 r =
-            bst_vec3_sub(bst_vec3_axpy(w->base, i * w->curved->length_m, w->z), rim.centre);
-        r = bst_vec3_axpy(r, -bst_vec3_dot(r, rim.axis) / rim.rate, v->z);
-        double moved = bst_vec3_norm(r);
-        bool same = i == 1 && moved <= 1e-9 * radius; /* the rim itself: the limit from below */
-        double cosine =
-            same ? (radius - w->curved->radius_m) / lower
-                 : (radius * radius - ring * ring - moved * moved) / (2.0 * ring * moved);
-        middle = same ? middle : atan2(bst_vec3_dot(r, w->y), bst_vec3_dot(r, w->x));
-        lower = moved;
-        for (int side = -1; side <= 1 && fabs(cosine) < 1.0; side += 2) {
-            double place = turned_to(middle + side * acos(cosine), start);
-            if (place < end) {
-                add_place(w, place);
-            }
-        }
-    }
-}
-
-/* Adds the places of a hider's corners; of those with many corners the outermost ones. */
-static void add_corners(surface *w, int view, int hider, double start, double end) {
-    bst_point2 corner[HIDER_CORNERS];
-    const bst_pose_view *v = &w->shadow.pose->views[view];
-    int count = bst_line_shadow_corners(&w->shadow, view, hider, HIDER_CORNERS, corner);
-    bool few = count <= FEW_CORNERS;
-    double low = INFINITY, high = -INFINITY, place[2];
-    for (int n = 0; n < count; n++) {
-        int found = meet(w, v, corner[n], !few, start, place);
-        for (int m = 0; m < found; m++) {
-            if (place[m] > start && place[m] < end) {
-                low = fmin(low, place[m]);
-                high = fmax(high, place[m]);
-                if (few) {
-                    add_place(w, place[m]);
-                }
-            }
-        }
-        if (few && w->curved && !w->curved->sphere) {
-            add_crossings(w, v, corner[n], corner[n + 1 < count ? n + 1 : 0], start, end);
-        }
-    }
-    bst_point2 tangent[2][2];
-    bool straight = bst_line_shadow_tangents(&w->shadow, hider, tangent);
-    for (int i = 0; i < 4 && straight; i++) {
-        if (!w->curved && meet(w, v, tangent[i / 2][i % 2], false, start, place) > 0 &&
-            place[0] > start && place[0] < end) {
-            add_place(w, place[0]);
-        }
-        if (w->curved && !w->curved->sphere && i % 2 == 0) {
-            add_crossings(w, v, tangent[i / 2][0], tangent[i / 2][1], start, end);
-        }
-    }
-    if (!few && low <= high) {
-        add_place(w, low);
-        add_place(w, high);
-    }
-}
-
-static void add_all_corners(surface *w, double start, double end) {
-    for (int k = 0; k < 2; k++) {
-        for (int i = w->shadow.first[k]; i < w->shadow.first[k + 1]; i++) {
-            if (w->curved && w->shadow.pose->hiders[i][0] == w->curved->occluder) {
-                add_rim_crossings(w, &w->shadow.pose->views[k], start, end);
-            } else {
-                add_corners(w, k, i, start, end);
-            }
-        }
-    }
-    bst_sort_few(w->place, w->places);
-}
-
 /* Adds the integral between two places, in panels no wider than `widest`. Returned: its error. */
 static double add_range(const surface *w, double from, double to, double widest, light *sum) {
-    double error = 0.0, start = from, gap = fmin(NEAR * w->share, 0.02) * (to - from);
-    for (int n = 0; n <= w->places && start < to; n++) {
-        double end = n < w->places ? w->place[n] : to;
-        if (end >= to || to - end < gap) {
-            end = to;
-        } else if (end - start < gap) {
-            continue; /* what a jump changes within it is little */
+    double error = 0.0, start = from, gap = fmin(NEAR * w->share, NEAREST) * (to - from);
+    for (int n = 0; n <= w->on.places && start < to; n++) {
+        double end = n < w->on.places ? fmin(w->on.place[n], to) : to;
+        if (end <= start) {
+            continue;
+        }
+        if (end < to && (end - start < gap || to - end < gap)) {
+            sum->skipped = true; /* what a jump changes within it is little */
+            continue;
         }
         int parts = (int)ceil((end - start) / widest);
         for (int i = 0; i < parts; i++) {
@@ -399,61 +277,65 @@ static double add_range(const surface *w, double from, double to, double widest,
 
 /* Places a curved surface in the body frame. */
 static void place_curved(const bst_satellite_pose *p, surface *w) {
-    const bst_curved *c = w->curved;
-    w->base = bst_pose_moved(p, c->joint, c->base_m);
-    w->x = bst_pose_turned(p, c->joint, c->x);
-    w->y = bst_pose_turned(p, c->joint, c->y);
-    w->z = bst_pose_turned(p, c->joint, c->z);
+    bst_shaded_surface *on = &w->on;
+    const bst_curved *c = on->curved;
+    on->base = bst_pose_moved(p, c->joint, c->base_m);
+    on->x = bst_pose_turned(p, c->joint, c->x);
+    on->y = bst_pose_turned(p, c->joint, c->y);
+    on->z = bst_pose_turned(p, c->joint, c->z);
     double rise = c->top_radius_m - c->radius_m;
     w->slant_m = sqrt(rise * rise + c->length_m * c->length_m);
-    w->radial = c->sphere ? 1.0 : c->side * c->length_m / w->slant_m;
-    w->axial = c->sphere ? 0.0 : -c->side * rise / w->slant_m;
+    w->radial = c->side * c->length_m / w->slant_m;
+    w->axial = -c->side * rise / w->slant_m;
     if (c->sphere) {
         bst_vec3 axis = bst_vec3_cross(w->observer, w->sun);
-        w->z =
+        on->z =
             bst_vec3_norm(axis) > 1e-9 ? bst_vec3_unit(axis) : bst_vec3_perpendicular(w->observer);
-        w->x = w->observer;
-        w->y = bst_vec3_cross(w->z, w->x);
+        on->x = w->observer;
+        on->y = bst_vec3_cross(on->z, on->x);
+        make_bands(w);
     }
 }
 
-/* The free share, and the bound of its error: the differences of panels may all be small by chance,
- * so that a part shadow has at least what one panel may differ by. */
+/* The free share, and the estimate of its error: the differences of panels may all be small by
+ * chance, so that a part shadow has at least what one panel may differ by. */
 static double share_of(const surface *w, const light *sum, double *error) {
     if (!(sum->all > 0.0)) {
         *error = 0.0;
         return 1.0;
     }
     bool part = sum->lost > 0.0 && sum->lost < sum->all;
-    *error = (*error + (part ? w->tolerance : 0.0)) / sum->all;
+    bool unsure = part || sum->skipped || w->on.crowded;
+    *error = (*error + (unsure ? w->tolerance : 0.0)) / sum->all;
     return fmax(1.0 - sum->lost / sum->all, 0.0);
 }
 
-double bst_curved_free_share(bst_satellite_pose *p, int curved, double light_m2, double tolerance,
-                             double *error) {
+double bst_curved_free_share(bst_satellite_pose *p, int curved, double light_m2, bool disc,
+                             double tolerance, double *error) {
     const bst_curved *c = &p->satellite->curved[curved];
-    surface w = {.curved = c,
-                 .line = c->sphere ? sphere_line : cone_line,
-                 .lines = c->sphere ? CHORDS : 1,
+    surface w = {.lines = c->sphere ? sphere_lines : cone_lines,
                  .brdf = &p->satellite->materials[c->material].brdf,
                  .observer = p->views[0].z,
                  .sun = p->views[1].z};
     double panel[BST_CURVED_PANELS_MAX][2];
     light sum = {.end = NAN};
     *error = 0.0;
-    place_curved(p, &w);
-    bst_line_ring rings[2] = {{w.base, w.z, c->radius_m},
-                              {bst_vec3_axpy(w.base, c->length_m, w.z), w.z, c->top_radius_m}};
+    w.on.curved = c;
+    bst_vec3 base = bst_pose_moved(p, c->joint, c->base_m);
+    bst_vec3 axis = bst_pose_turned(p, c->joint, c->z);
+    bst_line_ring rings[2] = {{base, axis, c->radius_m},
+                              {bst_vec3_axpy(base, c->length_m, axis), axis, c->top_radius_m}};
     if (c->sphere) {
         rings[0].axis = (bst_vec3){0};
     }
-    if (!bst_line_shadow_make(p, c->occluder, c->side < 0.0, rings, c->sphere ? 1 : 2, &w.shadow)) {
+    bst_line_shadow *shadow = &w.on.shadow;
+    if (!bst_line_shadow_make(p, c->occluder, c->side < 0.0, rings, c->sphere ? 1 : 2, shadow)) {
         return 1.0;
     }
-    if (c->side < 0.0 &&
-        !(w.shadow.rim[0].radius_m[0] > 0.0 && w.shadow.rim[1].radius_m[0] > 0.0)) {
+    if (c->side < 0.0 && !(shadow->rim[0].radius_m[0] > 0.0 && shadow->rim[1].radius_m[0] > 0.0)) {
         return 0.0; /* Sun or observer are behind the rim */
     }
+    place_curved(p, &w);
     bst_vec3 sun = bst_pose_turned_back(p, c->joint, w.sun);
     bst_vec3 observer = bst_pose_turned_back(p, c->joint, w.observer);
     int panels = bst_curved_panels(c, w.brdf, sun, observer, panel);
@@ -461,31 +343,50 @@ double bst_curved_free_share(bst_satellite_pose *p, int curved, double light_m2,
     w.tolerance = tolerance * light_m2;
     double width = PANEL_RAD * fmin(fmax(cbrt(tolerance / FINE), 1.0), WIDEN);
     w.narrow = 1.01 * width;
-    if (panels > 0 && tolerance < COARSE) {
-        add_all_corners(&w, panel[0][0], panel[panels - 1][1]);
+    if (panels > 0) {
+        bst_surface_find_places(&w.on, panel[0][0], panel[panels - 1][1]);
     }
     for (int i = 0; i < panels; i++) {
         *error += add_range(&w, panel[i][0], panel[i][1], width, &sum);
     }
-    return share_of(&w, &sum, error);
+    double share = share_of(&w, &sum, error);
+    if (share > 0.0 && share < 1.0 && !disc) {
+        *error += fabs(sum.all / light_m2 - 1.0);
+    }
+    return share;
 }
 
 bool bst_plane_is_round(const bst_satellite_pose *p, int index) {
     const bst_satellite *s = p->satellite;
     const bst_facet *f = &s->facets[index];
-    if (s->occluders[f->occluder].curved_count > 0) {
-        return f->count > SIDES_MAX;
+    if (f->count > SIDES_MAX && s->occluders[f->occluder].curved_count > 0) {
+        return true;
     }
-    if (s->occluder_count > BST_SEPARATION_BODIES || f->count > SIDES_MAX) {
-        return false;
+    bool few = s->occluder_count <= BST_SEPARATION_BODIES;
+    double bounds[2][6];
+    for (int k = 0; k < 2; k++) {
+        bst_pose_start_bounds(bounds[k]);
+        for (int i = 0; i < f->count && !few; i++) {
+            bst_pose_add_to_bounds(&p->views[k], s->corner[f->first + i], bounds[k]);
+        }
     }
-    uint64_t hiders = p->views[0].hiders[f->occluder] | p->views[1].hiders[f->occluder];
-    for (int o = 0; o < s->occluder_count; o++) {
-        if ((hiders >> o & 1) && s->occluders[o].curved_count > 0) {
-            return true;
+    for (int i = 0; i < s->curved_count; i++) {
+        int o = s->curved[i].occluder;
+        for (int k = 0; k < 2 && o != f->occluder; k++) {
+            const bst_pose_view *v = &p->views[k];
+            if (few ? v->hiders[f->occluder] >> o & 1
+                    : bst_pose_may_hide(v->bounds[o], bounds[k])) {
+                return true;
+            }
         }
     }
     return false;
+}
+
+bool bst_plane_has_lines(const bst_satellite_pose *p, int index) {
+    const bst_satellite *s = p->satellite;
+    const bst_facet *f = &s->facets[index];
+    return f->count <= SIDES_MAX || s->occluders[f->occluder].curved_count > 0;
 }
 
 double bst_plane_free_share(bst_satellite_pose *p, int index, double tolerance, double *error) {
@@ -493,36 +394,39 @@ double bst_plane_free_share(bst_satellite_pose *p, int index, double tolerance, 
     const bst_facet *f = &s->facets[index];
     const int *corner = s->corner + f->first;
     bool disc = f->count > SIDES_MAX;
-    surface w = {.line = disc ? disc_line : polygon_line, .lines = 1, .z = p->normals[index]};
+    surface w = {.lines = disc ? disc_lines : polygon_lines};
+    bst_shaded_surface *on = &w.on;
     double low = INFINITY, high = -INFINITY;
     light sum = {.end = NAN};
     *error = 0.0;
     bst_line_ring rings[SIDES_MAX];
-    w.base = p->vertices[corner[0]];
-    w.x = bst_vec3_unit(bst_vec3_sub(p->vertices[corner[1]], w.base));
-    w.y = bst_vec3_cross(w.z, w.x);
+    assert(bst_plane_has_lines(p, index));
+    on->base = p->vertices[corner[0]];
+    on->z = p->normals[index];
+    on->x = bst_vec3_unit(bst_vec3_sub(p->vertices[corner[1]], on->base));
+    on->y = bst_vec3_cross(on->z, on->x);
     if (disc) {
-        w.base = bst_pose_middle_of(p, f);
-        w.radius_m = sqrt(f->area_m2 / BST_PI);
+        on->base = bst_pose_middle_of(p, f);
+        on->radius_m = sqrt(f->area_m2 / BST_PI);
         low = 0.0;
         high = BST_PI;
-        rings[0] = (bst_line_ring){w.base, w.z, w.radius_m};
+        rings[0] = (bst_line_ring){on->base, on->z, on->radius_m};
     }
-    w.corners = disc ? 0 : f->count;
-    for (int i = 0; i < w.corners; i++) {
-        bst_vec3 r = bst_vec3_sub(p->vertices[corner[i]], w.base);
-        w.corner[i] = (bst_point2){bst_vec3_dot(r, w.x), bst_vec3_dot(r, w.y)};
-        low = fmin(low, w.corner[i].y);
-        high = fmax(high, w.corner[i].y);
+    on->corners = disc ? 0 : f->count;
+    for (int i = 0; i < on->corners; i++) {
+        bst_vec3 r = bst_vec3_sub(p->vertices[corner[i]], on->base);
+        on->corner[i] = (bst_point2){bst_vec3_dot(r, on->x), bst_vec3_dot(r, on->y)};
+        low = fmin(low, on->corner[i].y);
+        high = fmax(high, on->corner[i].y);
         rings[i] = (bst_line_ring){p->vertices[corner[i]], {0.0, 0.0, 0.0}, 0.0};
     }
-    if (!bst_line_shadow_make(p, f->occluder, f->inside, rings, disc ? 1 : f->count, &w.shadow)) {
+    if (!bst_line_shadow_make(p, f->occluder, f->inside, rings, disc ? 1 : f->count, &on->shadow)) {
         return 1.0;
     }
     w.share = tolerance;
     w.tolerance = tolerance * f->area_m2;
     w.narrow = 0.5 * (high - low) / PLANE_PANELS;
-    add_all_corners(&w, low, high);
+    bst_surface_find_places(on, low, high);
     *error = add_range(&w, low, high, (high - low) / PLANE_PANELS, &sum);
     return share_of(&w, &sum, error);
 }

@@ -112,9 +112,26 @@ static bst_status set_burns(bst_ctx *ctx, const bst_config_list *burns, bst_obje
     return BST_OK;
 }
 
+/* The listed object with external_states on which the place of another one depends: itself, or the
+ * one that its orbit is relative to, directly or over others. Returned: its index; -1: none. */
+static int moved_from_outside(const bst_object_config *all, int index) {
+    while (index >= 0 && !all[index].external_states) {
+        const bst_orbit_config *orbit = &all[index].orbit;
+        if (orbit->source != BST_ORBIT_RELATIVE) {
+            return -1;
+        }
+        do {
+            index--; /* references are to earlier ones */
+        } while (index >= 0 && strcmp(all[index].name, orbit->reference) != 0);
+    }
+    return index;
+}
+
 /* Builds the shape of a listed object; the world owns it. */
-static bst_status make_shape(const bst_world_builder *b, const bst_object_config *config, int index,
+static bst_status make_shape(const bst_world_builder *b, const bst_object_config *all, int index,
                              world_object *object) {
+    const bst_object_config *config = &all[index];
+    int outside = moved_from_outside(all, index);
     bool wanted = config->brightness.model == BST_BRIGHTNESS_SHAPE;
     bool given = bst_object_shape_is_given(&config->shape);
     if (wanted != given) {
@@ -124,14 +141,18 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
                                : "brightness/model: the object has a shape (allowed: \"shape\"; or "
                                  "leave out the shape)");
     }
-    if (config->brightness.heat_balance != BST_HEAT_NONE &&
-        (!given ||
-         (config->external_states && config->brightness.heat_balance == BST_HEAT_TRANSIENT))) {
-        return bst_fail(b->ctx, BST_ERR_CONFIG, "%s: /world/objects/%d/brightness/heat_balance: %s",
-                        b->scenario, index,
-                        given ? "transient follows from the past of the object, which "
-                                "external_states may change (allowed: none, steady)"
-                              : "it needs a shape (allowed: none; or the brightness model shape)");
+    if (config->brightness.heat_balance != BST_HEAT_NONE && !given) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: /world/objects/%d/brightness/heat_balance: it needs a shape (allowed: "
+                        "none; or the brightness model shape)",
+                        b->scenario, index);
+    }
+    if (config->brightness.heat_balance == BST_HEAT_TRANSIENT && outside >= 0) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: /world/objects/%d/brightness/heat_balance: transient follows from the "
+                        "past of the object, which /world/objects/%d/external_states may change "
+                        "(allowed: none, steady)",
+                        b->scenario, index, outside);
     }
     if (config->brightness.interreflection && !given) {
         return bst_fail(b->ctx, BST_ERR_CONFIG,
@@ -162,12 +183,12 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
     b->world->shapes[b->world->shape_count++] = shape;
     object->info.shape = shape;
     bool torques = bst_body_attitude_has_torques(shape->attitude);
-    if (torques && config->external_states) {
-        return bst_fail(
-            b->ctx, BST_ERR_CONFIG,
-            "%s: /world/objects/%d/attitude: torques of an object with external_states, "
-            "whose place is not known in advance (allowed: one of the two)",
-            b->scenario, index);
+    if (torques && outside >= 0) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: /world/objects/%d/attitude: torques need a place that is known in "
+                        "advance, which /world/objects/%d/external_states may change (allowed: one "
+                        "of the two)",
+                        b->scenario, index, outside);
     }
     if (config->orbit.forces.shape || torques || config->brightness.heat_balance != BST_HEAT_NONE) {
         bst_satellite_make_surfaces(shape->satellite);
@@ -272,7 +293,7 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         if (config->occults) {
             world->occulters[world->occulter_count++] = i;
         }
-        BST_TRY(make_shape(b, config, i, object));
+        BST_TRY(make_shape(b, configs, i, object));
         BST_TRY(make_torque(b, config, i, object));
         BST_TRY(build_orbit(b, config, i, object));
         if (config->external_states) {

@@ -270,11 +270,56 @@ static void wrong_torques_are_refused(void **state) {
     }
 }
 
+/* The place of an object whose orbit is relative to one with external_states, directly or over
+ * others, is not known in advance: no torques, and no heat of its past. */
+static void torques_need_a_known_place(void **state) {
+    (void)state;
+    static const struct {
+        const char *external, *reference, *heat, *keys, *says;
+    } cases[] = {
+        {"true", "middle", "", ", " TUMBLE(ALL),
+         "/world/objects/2/attitude: torques need a place that is known in advance, which "
+         "/world/objects/0/external_states may change"},
+        {"true", "chief", "", ", " TUMBLE(ALL), "which /world/objects/0/external_states may"},
+        {"true", "chief", ", \"heat_balance\": \"transient\"", "",
+         "/world/objects/2/brightness/heat_balance: transient follows from the past of the object, "
+         "which /world/objects/0/external_states may change"},
+        {"true", "middle", ", \"heat_balance\": \"steady\"", "", NULL},
+        {"false", "middle", "", ", " TUMBLE(ALL), NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[4000];
+        bst_ctx ctx = {0};
+        bst_world *world = NULL;
+        snprintf(text, sizeof text,
+                 "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [{\"name\": "
+                 "\"chief\", \"external_states\": %s, " CIRCLE("7e6", "") "}, {\"name\": "
+                 "\"middle\", \"orbit\": {\"source\": \"relative\", \"reference\": \"chief\"}}, "
+                 "{\"name\": \"last\", \"brightness\": {\"model\": \"shape\"%s}, \"shape\": "
+                 "{\"materials\": [{\"name\": \"b\"}], \"parts\": [{\"name\": \"p\", \"kind\": "
+                 "\"plate\", \"material\": \"b\"}]}, \"orbit\": {\"source\": \"relative\", "
+                 "\"reference\": \"%s\"}%s}]}, \"observers\": [{\"name\": \"neossat\", "
+                 TEST_NEOSSAT ", \"sensors\": [{" TEST_CAMERA "}]}]}",
+                 cases[i].external, cases[i].heat, cases[i].reference, cases[i].keys);
+        bst_status status = test_world_try(&ctx, TEST_EPOCH, text, &world);
+        if (!cases[i].says) {
+            bst_assert_ok(&ctx, status);
+            bst_world_free(world);
+        } else if (status != BST_ERR_CONFIG || !strstr(ctx.message, cases[i].says)) {
+            fail_msg("\"%s\" has no \"%s\"", ctx.message, cases[i].says);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_plate_has_its_torque),    cmocka_unit_test(round_bodies_have_no_torque),
-        cmocka_unit_test(eclipses_gradient_and_air), cmocka_unit_test(a_windmill_spins_up),
-        cmocka_unit_test(phases_continue),           cmocka_unit_test(wrong_torques_are_refused),
+        cmocka_unit_test(a_plate_has_its_torque),
+        cmocka_unit_test(round_bodies_have_no_torque),
+        cmocka_unit_test(eclipses_gradient_and_air),
+        cmocka_unit_test(a_windmill_spins_up),
+        cmocka_unit_test(phases_continue),
+        cmocka_unit_test(wrong_torques_are_refused),
+        cmocka_unit_test(torques_need_a_known_place),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
