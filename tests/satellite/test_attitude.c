@@ -192,6 +192,44 @@ static void rows_are_followed_at_even_rates(void **state) {
     }
 }
 
+/* Rows that a table may not have, each with one beside it that it may. */
+static void rows_ascend_and_are_unit_quaternions(void **state) {
+    (void)state;
+    static const struct {
+        const char *row;
+        bool good;
+    } cases[] = {{"12.5, 0.6, 0, 0, 0.8", true},     {"12, 0.6, 0, 0, 0.8", false},
+                 {"11.9, 0.6, 0, 0, 0.8", false},    {"12.5, 0, 0.6, 0.8, 0", true},
+                 {"12.5, 0.6, 0, 0, 0.8009", true},  {"12.5, 0.6, 0, 0, 0.8013", false},
+                 {"12.5, 0.6, 0, 0, 0.7991", true},  {"12.5, 0.6, 0, 0, 0.7987", false},
+                 {"1e9, 0.6, 0, 0, 0.8", true},      {"1.01e9, 0.6, 0, 0, 0.8", false},
+                 {"12.5, 0.6, 0, 0", false},         {"12.5, 0.6, 0, 0, 0.8, 1", false},
+                 {"12.5, 0.6, nan, 0, 0.8", false}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char path[BST_TEST_PATH];
+        bst_test_template(path, "attitude");
+        int handle = mkstemp(path);
+        assert_true(handle >= 0);
+        FILE *file = fdopen(handle, "w");
+        assert_non_null(file);
+        fprintf(file, "time_s, qx, qy, qz, qw\n12, 0, 0, 1, 0\n%s\n", cases[k].row);
+        assert_int_equal(fclose(file), 0);
+        bst_ctx ctx = {0};
+        bst_attitude_row *rows;
+        int count;
+        bst_status status = bst_attitude_table_load(&ctx, &from, path, "", &rows, &count);
+        (void)remove(path);
+        assert_int_equal(status, cases[k].good ? BST_OK : BST_ERR_CONFIG);
+        if (cases[k].good) {
+            assert_int_equal(count, 2);
+            assert_true(rows[1].seconds == strtod(cases[k].row, NULL));
+            free(rows);
+        } else {
+            assert_non_null(strstr(ctx.message, "line 3"));
+        }
+    }
+}
+
 /* From its time on a command turns the body about its own axes, until the next one; of more than
  * there is room for the latest are kept. */
 static void commands_hold_until_the_next(void **state) {
@@ -265,6 +303,7 @@ int main(void) {
         cmocka_unit_test(a_phase_continues_the_one_before),
         cmocka_unit_test(wrong_attitudes_are_refused),
         cmocka_unit_test(rows_are_followed_at_even_rates),
+        cmocka_unit_test(rows_ascend_and_are_unit_quaternions),
         cmocka_unit_test(commands_hold_until_the_next),
         cmocka_unit_test(rates_of_the_laws),
     };
