@@ -2,8 +2,8 @@
 #include "sim/optics/ghosts.h"
 #include "tests/world/field_scene.h"
 
-static const bst_window full = {0, 0, 1024, 1024}, wide = {0, 0, 1024, 400},
-                        high = {0, 0, 400, 1024};
+static const bst_window full = {0, 0, 1024, 1024}, wide = {0, 0, 800, 400}, high = {0, 0, 400, 800};
+enum { OUTSIDE_PX = 300 }; /* from which the second ghost of the scene takes light */
 
 static void query(scene *s, double sigma, bst_window window) {
     bst_field_options options = {.v_limit = 13, .margin_px = 5, .ghost_sigma = sigma};
@@ -28,8 +28,8 @@ static scene ghost_scene_on(bst_window sensor) {
              ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": "
              "{\"pixel_scale_arcsec\": 3, \"width_px\": %d, \"height_px\": %d, \"aperture_m\": "
              "0.15, \"ghosts\": [{\"intensity\": 0.05, \"radius_px\": 3}, {\"intensity\": 0.5, "
-             "\"factor\": 0.5}]}}]}]}",
-             sensor.width, sensor.height);
+             "\"factor\": 0.5, \"outside_px\": %d}]}}]}]}",
+             sensor.width, sensor.height, OUTSIDE_PX);
     scene s = make_scene_in(test_world(text));
     for (int64_t tick = 0; tick <= 3000; tick += 100) {
         double u = (double)tick / 3000.0 - 0.5;
@@ -120,27 +120,31 @@ static void windows_see_ghosts_of_stars_elsewhere(void **state) {
     free_scene(&s);
 }
 
-/* On sensors of unequal sides: each star that is bright enough has a ghost by the second one, which
- * is within the sensor wherever the star is. */
-static void stars_anywhere_on_the_sensor_have_ghosts(void **state) {
+/* On sensors of unequal sides: each star that is bright enough has a ghost by the second one where
+ * that lies on the sensor, also from so far outside as it takes light from. */
+static void stars_about_the_sensor_have_ghosts(void **state) {
     (void)state;
+    const bst_window around = {0, 0, 2048, 2048};
+    scene all = ghost_scene_on(around);
+    query(&all, 0.05, around);
     for (int tall = 0; tall < 2; tall++) {
         const bst_window sensor = tall ? high : wide;
         scene s = ghost_scene_on(sensor);
         query(&s, 0.05, sensor);
         const double sigma = sqrt(s.truth.background_e + s.truth.dark_e + 64.0);
-        int far = 0;
-        for (int i = 0; i < s.count; i++) {
-            const bst_scene_source *source = &s.sources[i];
-            if (source->kind != BST_SOURCE_STAR) {
-                continue;
-            }
+        int outside[4] = {0}; /* left, right, above, below */
+        for (int i = 0; i < all.count; i++) {
+            const bst_scene_source *source = &all.sources[i];
             bst_truth_item item;
-            bst_field_truth_item(s.field, &s.track, source, sensor, 1, &s.truth, &item);
+            bst_field_truth_item(all.field, &all.track, source, around, 1, &all.truth, &item);
+            /* from the middle of both sensors */
+            double x = item.x_mid_px - 1023.5, y = item.y_mid_px - 1023.5;
+            bool near = fabs(x) < 0.5 * sensor.width + OUTSIDE_PX - 1.0 &&
+                        fabs(y) < 0.5 * sensor.height + OUTSIDE_PX - 1.0 &&
+                        fabs(x) < sensor.width - 1.0 && fabs(y) < sensor.height - 1.0;
             /* half of its light, of which the brightest pixel of 12 px of motion has 1 % or more */
-            if (0.5 * 0.01 * item.electrons < 0.05 * sigma || item.x_mid_px < 0.0 ||
-                item.y_mid_px < 0.0 || item.x_mid_px > sensor.width - 1.0 ||
-                item.y_mid_px > sensor.height - 1.0) {
+            if (source->kind != BST_SOURCE_STAR || !near ||
+                0.5 * 0.01 * item.electrons < 0.05 * sigma) {
                 continue;
             }
             int ghosts = 0;
@@ -150,19 +154,22 @@ static void stars_anywhere_on_the_sensor_have_ghosts(void **state) {
                           g->ghost->factor == 0.5;
             }
             assert_int_equal(ghosts, 1);
-            /* beyond the side that the sensor has in the other direction */
-            far += (tall ? item.y_mid_px : item.x_mid_px) > 400.0;
+            outside[0] += x < -0.5 * sensor.width;
+            outside[1] += x > 0.5 * sensor.width;
+            outside[2] += y < -0.5 * sensor.height;
+            outside[3] += y > 0.5 * sensor.height;
         }
-        assert_true(far >= 1);
+        assert_true(outside[tall ? 2 : 0] >= 1 && outside[tall ? 3 : 1] >= 1);
         free_scene(&s);
     }
+    free_scene(&all);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sources_have_ghosts_where_they_are_mapped),
         cmocka_unit_test(windows_see_ghosts_of_stars_elsewhere),
-        cmocka_unit_test(stars_anywhere_on_the_sensor_have_ghosts),
+        cmocka_unit_test(stars_about_the_sensor_have_ghosts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
