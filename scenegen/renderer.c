@@ -112,15 +112,25 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     return BST_OK;
 }
 
+/* Pixels of a sensor above which more threads draw its maps, some 0.1 us a pixel. */
+enum { PIXELS_FOR_THREADS = 1 << 18 };
+
 /* Starts the threads of the planning, if the device leaves the processor idle, and creates the
- * detector. */
+ * detector, whose maps have threads of their own with a device that is the processor. */
 static bst_status open_detector(bst_ctx *ctx, bst_device *device, bst_renderer *r) {
     int threads = r->options.planning_threads;
     if (threads > 1 || (threads == 0 && !bst_device_is_cpu(device))) {
         BST_TRY(bst_parallel_create(ctx, threads, &r->planners));
     }
-    BST_TRY(bst_detector_create(ctx, device, &r->camera, r->options.pattern, r->planners,
-                                &r->detector));
+    bst_parallel *maps = NULL;
+    if (threads == 0 && !r->planners &&
+        r->camera.width_px * r->camera.height_px >= PIXELS_FOR_THREADS) {
+        BST_TRY(bst_parallel_create(ctx, bst_device_processors(device), &maps));
+    }
+    bst_status status = bst_detector_create(ctx, device, &r->camera, r->options.pattern,
+                                            r->planners, maps ? maps : r->planners, &r->detector);
+    bst_parallel_free(maps);
+    BST_TRY(status);
     return r->options.saturation_flags ? bst_detector_keep_flags(ctx, r->detector) : BST_OK;
 }
 

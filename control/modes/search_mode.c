@@ -15,6 +15,9 @@ void bst_control_enter(bst_control *c, int mode, int64_t tick, const char *reaso
         c->transitions[c->transition_count++] =
             (bst_control_transition){.from = c->mode, .to = mode, .reason = reason};
     }
+    if (mode == BST_MODE_SLEW || mode == BST_MODE_TRACK) {
+        c->search_mode = BST_MODE_SEARCH; /* what was lost before is no longer looked for */
+    }
     c->mode = mode;
     c->mode_tick = tick;
     bst_control_forget_aims(c);
@@ -186,9 +189,12 @@ bst_status bst_control_best_candidate(bst_ctx *ctx, const bst_control *c, const 
     bst_onboard_cue cue;
     BST_TRY(bst_control_cue_at(ctx, c, tracks->tick, &cue));
     *out = NULL;
-    bst_vec3 rate = c->mode == BST_MODE_REACQUIRE ? c->lost.rate_gcrf_radps : cue.rate_gcrf_radps;
+    /* a candidate for the lost target may have been seen, and be seen no more */
+    bool lost = c->mode == BST_MODE_REACQUIRE ||
+                (c->mode == BST_MODE_ACQUIRE && c->search_mode == BST_MODE_REACQUIRE);
+    bst_vec3 rate = lost ? c->lost.rate_gcrf_radps : cue.rate_gcrf_radps;
     double rate_sigma = cue.valid ? cue.rate_sigma_radps : 0.0, best = 0.0;
-    if (!cue.valid && c->mode != BST_MODE_REACQUIRE) {
+    if (!cue.valid && !lost) {
         return BST_OK;
     }
     double own = c->config.candidate_rate_sigmas * rate_sigma;

@@ -143,16 +143,16 @@ static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, const
 }
 
 static bst_status make_map(bst_ctx *ctx, bst_detector *d,
-                           bst_status (*make)(bst_ctx *, const bst_camera *, bst_rng_key, int,
-                                              float *),
-                           cl_mem *out) {
+                           bst_status (*make)(bst_ctx *, const bst_camera *, bst_rng_key,
+                                              bst_parallel *, int, float *),
+                           bst_parallel *maps, cl_mem *out) {
     size_t count = (size_t)d->stride * (size_t)d->camera.height_px;
     count += make ? 0 : count / 64; /* marks of the overlay's chunks */
     float *map = calloc(count, sizeof *map);
     if (!map) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a map of the detector");
     }
-    bst_status status = make ? make(ctx, &d->camera, d->pattern, d->stride, map) : BST_OK;
+    bst_status status = make ? make(ctx, &d->camera, d->pattern, maps, d->stride, map) : BST_OK;
     if (status == BST_OK) {
         status = make_buffer(ctx, d, count * sizeof *map, map, out);
     }
@@ -200,16 +200,16 @@ static bst_status make_codes(bst_ctx *ctx, bst_detector *d) {
     return status;
 }
 
-static bst_status make_all(bst_ctx *ctx, bst_device *device, bst_detector *d) {
+static bst_status make_all(bst_ctx *ctx, bst_device *device, bst_parallel *maps, bst_detector *d) {
     const bst_detector_config *c = &d->camera.detector;
     if (bst_fixed_pattern_noise_has_gain(&d->camera)) {
-        BST_TRY(make_map(ctx, d, bst_fixed_pattern_noise_gain, &d->gain));
+        BST_TRY(make_map(ctx, d, bst_fixed_pattern_noise_gain, maps, &d->gain));
     }
     if (bst_fixed_pattern_noise_has_dark(&d->camera)) {
-        BST_TRY(make_map(ctx, d, bst_fixed_pattern_noise_dark, &d->dark));
+        BST_TRY(make_map(ctx, d, bst_fixed_pattern_noise_dark, maps, &d->dark));
     }
     if (bst_readout_charge_is_on(c)) {
-        BST_TRY(make_map(ctx, d, bst_readout_charge_map, &d->readout));
+        BST_TRY(make_map(ctx, d, bst_readout_charge_map, maps, &d->readout));
     }
     if (has_offsets(c)) {
         BST_TRY(make_offsets(ctx, d));
@@ -218,7 +218,7 @@ static bst_status make_all(bst_ctx *ctx, bst_device *device, bst_detector *d) {
         BST_TRY(make_codes(ctx, d));
     }
     if (c->cosmic_rays.rate_per_cm2_s > 0.0) {
-        BST_TRY(make_map(ctx, d, NULL, &d->overlay));
+        BST_TRY(make_map(ctx, d, NULL, maps, &d->overlay));
         BST_TRY(bst_cosmic_rays_create(ctx, &c->cosmic_rays, (int)d->camera.width_px,
                                        (int)d->camera.height_px, d->stride, &d->hits));
         bst_cosmic_rays_set_overscan(d->hits, &c->overscan);
@@ -231,7 +231,8 @@ static bst_status make_all(bst_ctx *ctx, bst_device *device, bst_detector *d) {
 }
 
 bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
-                               bst_rng_key pattern, bst_parallel *pool, bst_detector **out) {
+                               bst_rng_key pattern, bst_parallel *pool, bst_parallel *maps,
+                               bst_detector **out) {
     assert(device && camera && out);
     *out = NULL;
     bst_detector *d = calloc(1, sizeof *d);
@@ -246,7 +247,7 @@ bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camer
     d->queue = bst_device_queue(device);
     clRetainContext(d->context);
     clRetainCommandQueue(d->queue);
-    bst_status status = make_all(ctx, device, d);
+    bst_status status = make_all(ctx, device, maps, d);
     if (status != BST_OK) {
         bst_detector_free(d);
         return status;

@@ -22,10 +22,11 @@ typedef struct bst_detector bst_detector;
  *
  * Given:     pattern  random key of the fixed patterns
  *            pool     threads for what each exposure draws; lent; NULL: the caller's alone
+ *            maps     threads for the maps, until it returns; NULL: the caller's alone
  * Errors:    BST_ERR_CONFIG, naming the key, for an unusable map or code table; BST_ERR_DEVICE,
  *            BST_ERR_MEMORY */
 bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
-                               bst_rng_key pattern, bst_parallel *pool,
+                               bst_rng_key pattern, bst_parallel *pool, bst_parallel *maps,
                                bst_detector **out) BST_MUST_CHECK;
 /* Frees a detector with its buffers on the device; NULL is allowed. */
 void bst_detector_free(bst_detector *detector);

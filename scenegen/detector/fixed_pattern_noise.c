@@ -79,28 +79,47 @@ static bst_status load_map(bst_ctx *ctx, const bst_camera *camera, const char *w
     return status;
 }
 
+/* Rows of a map that are drawn in parallel: each pixel's numbers depend on its own counter. */
+typedef struct map_job {
+    const bst_camera *camera;
+    bst_rng_key key;
+    int stride;
+    float *map;
+} map_job;
+
+/* Rows in a part of a parallel loop. */
+enum { ROWS = 16 };
+
+static void gain_rows(void *user, int begin, int end) {
+    const map_job *job = user;
+    const bst_detector_config *d = &job->camera->detector;
+    const int width = (int)job->camera->width_px;
+    for (int y = begin; y < end; y++) {
+        float *row = job->map + (size_t)y * (size_t)job->stride;
+        for (int x = 0; x < width; x++) {
+            uint64_t pixel = (uint64_t)y * (uint64_t)width + (uint64_t)x;
+            if (!d->prnu_map[0]) {
+                double z = d->prnu_rms > 0.0 ? bst_rng_normal(job->key, DRAW_GAIN, pixel) : 0.0;
+                row[x] = (float)fmax(1.0 + d->prnu_rms * z, 0.0);
+            }
+            if (d->dead_fraction > 0.0 &&
+                bst_rng_uniform(job->key, DRAW_DEAD, pixel) < d->dead_fraction) {
+                row[x] = 0.0f;
+            }
+        }
+    }
+}
+
 bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
-                                        int stride, float *gain) {
+                                        bst_parallel *pool, int stride, float *gain) {
     assert(camera && gain && stride >= (int)camera->width_px);
     const bst_detector_config *d = &camera->detector;
     int width = (int)camera->width_px, height = (int)camera->height_px;
     if (d->prnu_map[0]) {
         BST_TRY(load_map(ctx, camera, "prnu_map", d->prnu_map, 1.0, stride, gain));
     }
-    for (int y = 0; y < height; y++) {
-        float *row = gain + (size_t)y * (size_t)stride;
-        for (int x = 0; x < width; x++) {
-            uint64_t pixel = (uint64_t)y * (uint64_t)width + (uint64_t)x;
-            if (!d->prnu_map[0]) {
-                double z = d->prnu_rms > 0.0 ? bst_rng_normal(key, DRAW_GAIN, pixel) : 0.0;
-                row[x] = (float)fmax(1.0 + d->prnu_rms * z, 0.0);
-            }
-            if (d->dead_fraction > 0.0 &&
-                bst_rng_uniform(key, DRAW_DEAD, pixel) < d->dead_fraction) {
-                row[x] = 0.0f;
-            }
-        }
-    }
+    map_job job = {camera, key, stride, gain};
+    bst_parallel_for(pool, height, ROWS, gain_rows, &job);
     for (int64_t i = 0; i < d->bad_columns && i < camera->width_px; i++) {
         int x = (int)(bst_rng_uniform(key, DRAW_COLUMN, (uint64_t)i) * width);
         int first = (int)(bst_rng_uniform(key, DRAW_COLUMN_ROW, (uint64_t)i) * height);
@@ -113,31 +132,40 @@ bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, 
     return BST_OK;
 }
 
-bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
-                                        int stride, float *dark) {
-    assert(camera && dark && stride >= (int)camera->width_px);
-    const bst_detector_config *d = &camera->detector;
-    double warm = bst_detector_dark_factor(d), mean = bst_camera_dark_e_per_s(camera);
-    int width = (int)camera->width_px, height = (int)camera->height_px;
-    if (d->dark_map[0]) {
-        BST_TRY(load_map(ctx, camera, "dark_map", d->dark_map, warm, stride, dark));
-    }
+static void dark_rows(void *user, int begin, int end) {
+    const map_job *job = user;
+    const bst_detector_config *d = &job->camera->detector;
+    const int width = (int)job->camera->width_px;
+    const double warm = bst_detector_dark_factor(d), mean = bst_camera_dark_e_per_s(job->camera);
     /* log-normal distribution of mean 1 */
-    double s2 = log1p(d->dsnu_rms * d->dsnu_rms), s = sqrt(s2);
-    for (int y = 0; y < height; y++) {
-        float *row = dark + (size_t)y * (size_t)stride;
+    const double s2 = log1p(d->dsnu_rms * d->dsnu_rms), s = sqrt(s2);
+    for (int y = begin; y < end; y++) {
+        float *row = job->map + (size_t)y * (size_t)job->stride;
         for (int x = 0; x < width; x++) {
             uint64_t pixel = (uint64_t)y * (uint64_t)width + (uint64_t)x;
             if (!d->dark_map[0]) {
-                double z = s > 0.0 ? bst_rng_normal(key, DRAW_DARK, pixel) : 0.0;
+                double z = s > 0.0 ? bst_rng_normal(job->key, DRAW_DARK, pixel) : 0.0;
                 row[x] = (float)(mean * exp(s * z - 0.5 * s2));
             }
-            if (d->hot_fraction > 0.0 && bst_rng_uniform(key, DRAW_HOT, pixel) < d->hot_fraction) {
-                double dex = d->hot_spread_dex * bst_rng_normal(key, DRAW_HOT_RATE, pixel);
+            if (d->hot_fraction > 0.0 &&
+                bst_rng_uniform(job->key, DRAW_HOT, pixel) < d->hot_fraction) {
+                double dex = d->hot_spread_dex * bst_rng_normal(job->key, DRAW_HOT_RATE, pixel);
                 row[x] += (float)(warm * d->hot_median_e_per_s * pow(10.0, dex));
             }
         }
     }
+}
+
+bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
+                                        bst_parallel *pool, int stride, float *dark) {
+    assert(camera && dark && stride >= (int)camera->width_px);
+    const bst_detector_config *d = &camera->detector;
+    if (d->dark_map[0]) {
+        BST_TRY(load_map(ctx, camera, "dark_map", d->dark_map, bst_detector_dark_factor(d), stride,
+                         dark));
+    }
+    map_job job = {camera, key, stride, dark};
+    bst_parallel_for(pool, (int)camera->height_px, ROWS, dark_rows, &job);
     clear_edges(camera, &d->overscan, stride, dark);
     return BST_OK;
 }

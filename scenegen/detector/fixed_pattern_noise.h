@@ -6,6 +6,7 @@
 
 #include "boresight/camera.h"
 #include "boresight/rng.h"
+#include "sim/core/parallel.h"
 
 /* True if pixels differ in response: PRNU, a map, dead pixels, bad columns, shielded edges or
  * overscan. */
@@ -14,15 +15,16 @@ bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera);
 bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera);
 
 /* Pixel response map (PRNU), [height][stride], stride >= width: 1 + prnu_rms z, at least 0, or
- * prnu_map; 0 in dead pixels, bad columns, shielded edges and overscan. */
+ * prnu_map; 0 in dead pixels, bad columns, shielded edges and overscan. Drawn by the threads of
+ * pool (NULL: the caller's): the same bits for any number of them. */
 bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
-                                        int stride, float *gain) BST_MUST_CHECK;
+                                        bst_parallel *pool, int stride, float *gain) BST_MUST_CHECK;
 
 /* Dark current map (DSNU) at the detector's temperature, e-/s, [height][stride]: log-normal with
  * mean dark_current_e_per_s and relative RMS dsnu_rms, or dark_map; plus hot pixels, log-normal
- * about their median; 0 in the overscan. */
+ * about their median; 0 in the overscan. Threads as for the response. */
 bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
-                                        int stride, float *dark) BST_MUST_CHECK;
+                                        bst_parallel *pool, int stride, float *dark) BST_MUST_CHECK;
 
 /* Fixed offsets of `count` columns or rows ("columns", "rows"), DN. */
 void bst_fixed_pattern_noise_offsets(const bst_camera *camera, bst_rng_key key, const char *which,

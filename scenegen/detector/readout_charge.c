@@ -11,10 +11,10 @@ bool bst_readout_charge_is_on(const bst_detector_config *d) {
 }
 
 /* Dark current of all pixels, e-/s, uniform if the camera has no map. */
-static bst_status dark_currents(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key, int stride,
-                                float *dark) {
+static bst_status dark_currents(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
+                                bst_parallel *pool, int stride, float *dark) {
     if (bst_fixed_pattern_noise_has_dark(camera)) {
-        return bst_fixed_pattern_noise_dark(ctx, camera, key, stride, dark);
+        return bst_fixed_pattern_noise_dark(ctx, camera, key, pool, stride, dark);
     }
     size_t count = (size_t)stride * (size_t)camera->height_px;
     for (size_t i = 0; i < count; i++) {
@@ -24,14 +24,14 @@ static bst_status dark_currents(bst_ctx *ctx, const bst_camera *camera, bst_rng_
 }
 
 bst_status bst_readout_charge_map(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
-                                  int stride, float *map) {
+                                  bst_parallel *pool, int stride, float *map) {
     assert(camera && map && stride >= (int)camera->width_px);
     const bst_detector_config *d = &camera->detector;
     int width = (int)camera->width_px, height = (int)camera->height_px;
     int left = (int)d->overscan.left, right = width - (int)d->overscan.right;
     double row_s = d->readout_s / height;
     double *passed = calloc((size_t)width, sizeof *passed); /* dark current of the rows below */
-    bst_status status = passed ? dark_currents(ctx, camera, key, stride, map)
+    bst_status status = passed ? dark_currents(ctx, camera, key, pool, stride, map)
                                : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a row of charge");
     for (int n = 0; status == BST_OK && n < height; n++) {
         int y = d->output.top ? height - 1 - n : n;

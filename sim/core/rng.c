@@ -58,7 +58,7 @@ void bst_rng_normal2(bst_rng_key key, uint64_t a, uint64_t b, double out[2]) {
 }
 
 double bst_rng_normal(bst_rng_key key, uint64_t a, uint64_t b) {
-    double pair[2];
-    bst_rng_normal2(key, a, b, pair);
-    return pair[0];
+    bst_philox_words r = bst_rng_words(key, a, b);
+    double angle = 2.0 * BST_PI * open_unit(r.w[2], r.w[3]);
+    return sqrt(-2.0 * log(open_unit(r.w[0], r.w[1]))) * cos(angle);
 }

@@ -174,10 +174,11 @@ void bst_onboard_forget_cue(bst_knowledge_view *view) {
 
 bool bst_knowledge_view_set_clock(bst_knowledge_view *view, double offset_s, double sigma_s) {
     assert(isfinite(offset_s) && sigma_s >= 0.0);
-    if (!(sigma_s > 0.0) || !(fabs(offset_s - view->clock_offset_s) > sigma_s / 3.0)) {
+    const double taken_s = sigma_s > 0.0 ? offset_s : 0.0;
+    if (!(fabs(taken_s - view->clock_offset_s) > sigma_s / 3.0)) {
         return false;
     }
-    view->clock_offset_s = offset_s;
+    view->clock_offset_s = taken_s;
     bst_onboard_forget_cue(view);
     return true;
 }

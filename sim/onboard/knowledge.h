@@ -54,9 +54,9 @@ bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledg
 /* Frees a view; the knowledge itself stays; NULL is allowed. */
 void bst_knowledge_view_free(bst_knowledge_view *view);
 
-/* Corrects the view's times by an estimate of the onboard clock's offset (sigma 0: there is none),
- * if it differs from that in use by more than a third of its sigma. True: it did, and the cue has
- * changed. */
+/* Corrects the view's times by an estimate of the onboard clock's offset (sigma 0: there is none,
+ * and no correction), if it differs from that in use by more than a third of its sigma. True: it
+ * did, and the cue has changed. */
 bool bst_knowledge_view_set_clock(bst_knowledge_view *view, double offset_s, double sigma_s);
 /* The clock offset in use, s; 0: none was set. */
 double bst_knowledge_view_clock_s(const bst_knowledge_view *view);

@@ -138,7 +138,8 @@ bst_status bst_run_candidates_take(bst_ctx *ctx, bst_run_candidates *c, int sens
     if (arc->count < BST_OD_LEAST) {
         return BST_OK;
     }
-    const int at = bst_od_link_arc(&c->linker, &c->motion, arc->directions, arc->count, WITHIN_S);
+    const int at =
+        bst_od_link_arc(&c->linker, &c->motion, sensor, arc->directions, arc->count, WITHIN_S);
     const bst_od_linked *item = &c->linker.items[at];
     const bool first = item->arcs == 1, was_wrong = !first && c->mixed[at];
     if (first) {

@@ -19,7 +19,8 @@ static const bst_io_column track_columns[] = {
     INT("object", "", "object that the track updated: id in truth; NULL: none, or a new one"),
     INT("new_object", "", "new object that the track updated: 1, 2, ...; NULL: none"),
     INT("true_object", "", "object that the track belongs to; NULL: none"),
-    REAL("chi2", "", "of the nearest candidate, 4 degrees of freedom; NULL: none"),
+    REAL("chi2", "",
+         "of the nearest candidate, 4 degrees of freedom, 2 if its middle found it; NULL: none"),
     REAL("nees", "", "error of the updated elements squared, by their covariance, 6 degrees"),
 };
 

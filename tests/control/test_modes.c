@@ -289,6 +289,47 @@ static void a_candidate_that_dies_or_stalls_is_given_up(void **state) {
     rig_close(&r);
 }
 
+/* Puts a track of an object that left the cue's place at time 0, by so many arcsec/s. */
+static void put_leaving(rig *r, int64_t id, int hits, double arcsec_per_s, int64_t mid_tick) {
+    const double off_rad = arcsec_per_s * BST_ARCSEC_RAD * (double)mid_tick / TICKS;
+    put_track(r, id, hits, off_rad / PX, arcsec_per_s, mid_tick);
+}
+
+/* A candidate for a lost target that flashes out is awaited with the rate that was lost, which is
+ * not the cue's. */
+static void a_lost_target_that_flashes_comes_back_by_its_own_rate(void **state) {
+    (void)state;
+    rig r;
+    rig_open(&r, NULL, true);
+    step(&r, 0, false);
+    int64_t t = 500;
+    const double own = 10.0;
+    for (int k = 0; k < 12; k++) {
+        r.tracks->count = 0;
+        put_leaving(&r, 2, 3 + k, own, t + 600);
+        r.tracks->target_id = 2;
+        step(&r, t += 1000, true);
+    }
+    assert_int_equal(r.status.mode, BST_MODE_TRACK);
+    r.tracks->count = 0;
+    r.tracks->target_id = 0;
+    step(&r, t += 1000, true);
+    assert_int_equal(r.status.mode, BST_MODE_REACQUIRE);
+    put_leaving(&r, 5, 3, own, t + 600);
+    step(&r, t += 1000, true);
+    assert_int_equal(r.status.mode, BST_MODE_ACQUIRE);
+    /* it goes out; a track that moves as the cue said is another object */
+    r.tracks->count = 0;
+    put_leaving(&r, 6, 3, 0.0, t + 600);
+    step(&r, t += 1000, true);
+    assert_int_equal(r.control.held.id, 5);
+    put_leaving(&r, 7, 3, own, t + 600);
+    step(&r, t += 1000, true);
+    assert_int_equal(r.status.mode, BST_MODE_ACQUIRE);
+    assert_int_equal(r.control.held.id, 7);
+    rig_close(&r);
+}
+
 static void without_frames_the_search_still_goes_on(void **state) {
     (void)state;
     rig r;
@@ -445,6 +486,7 @@ int main(void) {
         cmocka_unit_test(wasted_frames_and_vague_tracks),
         cmocka_unit_test(a_candidate_that_dies_or_stalls_is_given_up),
         cmocka_unit_test(without_frames_the_search_still_goes_on),
+        cmocka_unit_test(a_lost_target_that_flashes_comes_back_by_its_own_rate),
         cmocka_unit_test(open_loop_strategies),
         cmocka_unit_test(command_carries_the_aberration_of_the_observer),
         cmocka_unit_test(no_cue_no_command_but_a_named_target_is_followed),

@@ -150,6 +150,12 @@ static void an_estimated_clock_offset_corrects_the_cue(void **state) {
     bst_assert_close(test_distance(line.direction, sight.geometric), 0, 1e-15);
     bst_vec3 between = bst_vec3_sub(line.object.position_m, line.eye.position_m);
     bst_assert_close(bst_vec3_norm(between), sight.range_m, 1e-6);
+    /* without an estimate nothing is corrected */
+    assert_true(bst_knowledge_view_set_clock(s.kview, 1.04, 0.0));
+    assert_false(bst_knowledge_view_set_clock(s.kview, 1.04, 0.0));
+    assert_true(bst_knowledge_view_clock_s(s.kview) == 0.0);
+    now = cue_at(&s, 60);
+    bst_assert_close(test_distance(now.direction_gcrf, wrong.direction_gcrf), 0, 1e-15);
     drop(&s);
     drop(&right);
 }

@@ -115,7 +115,8 @@ static void charge_is_gathered_outside_the_exposure(void **state) {
     d->shielded = (bst_detector_edges_config){6, 7, 8, 9};
     d->overscan = (bst_detector_edges_config){3, 4, 0, 5};
     make(f);
-    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, PATTERN, SIDE, dark));
+    bst_assert_ok(&f->ctx,
+                  bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, PATTERN, NULL, SIDE, dark));
     for (int x = 0; x < SIDE; x++) {
         double passed = 0.0;
         for (int y = 0; y < SIDE; y++) {

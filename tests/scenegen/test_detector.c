@@ -112,7 +112,7 @@ static void response_differs_from_pixel_to_pixel(void **state) {
     f->camera.detector.bad_columns = 3;
     make(f);
     bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_gain(&f->ctx, &f->camera,
-                                                        (bst_rng_key){{21, 22}}, SIDE, gain));
+                                                        (bst_rng_key){{21, 22}}, NULL, SIDE, gain));
     mean_of(f, FRAMES, mean);
     double chi2 = 0.0, sum = 0.0, sum2 = 0.0;
     int dead = 0, columns = 0;
@@ -146,7 +146,8 @@ static void dark_current_differs_from_pixel_to_pixel(void **state) {
     f->camera.dark_current_e_per_s = 40.0;
     f->camera.detector.dsnu_rms = 0.3;
     bst_rng_key key = {{21, 22}};
-    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, SIDE, dark));
+    bst_assert_ok(&f->ctx,
+                  bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, NULL, SIDE, dark));
     double sum = 0.0, sum2 = 0.0;
     for (int i = 0; i < PIXELS; i++) {
         sum += (double)dark[i] / 40.0 / PIXELS;
@@ -159,7 +160,8 @@ static void dark_current_differs_from_pixel_to_pixel(void **state) {
     f->camera.dark_current_e_per_s = 0.0;
     f->camera.detector = (bst_detector_config){
         .hot_fraction = 0.05, .hot_median_e_per_s = 200.0, .hot_spread_dex = 0.4};
-    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, SIDE, dark));
+    bst_assert_ok(&f->ctx,
+                  bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, NULL, SIDE, dark));
     int hot = 0;
     for (int i = 0; i < PIXELS; i++) {
         if (dark[i] > 0.0f) {
@@ -233,21 +235,21 @@ static void maps_come_from_files(void **state) {
     char *path = f->camera.detector.prnu_map;
     snprintf(path, 512, "/tmp/bst_detector_map_%d.fits", (int)getpid());
     write_map(path, SIDE, SIDE, ramp);
-    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, SIDE, map));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, NULL, SIDE, map));
     for (int i = 0; i < PIXELS; i += 997) {
         assert_true(map[i] == ramp(i % SIDE, i / SIDE)); /* as written, to the bit */
     }
     snprintf(f->camera.detector.dark_map, 512, "%s", path);
     f->camera.detector.temperature_c = 6.5; /* one doubling */
-    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, SIDE, map));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, key, NULL, SIDE, map));
     assert_true(map[1000] == 2.0f * ramp(1000 % SIDE, 1000 / SIDE));
 
     write_map(path, SIDE, SIDE, negative);
-    assert_int_equal(bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, SIDE, map),
+    assert_int_equal(bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, NULL, SIDE, map),
                      BST_ERR_CONFIG);
     assert_non_null(strstr(f->ctx.message, "column 3, row 5"));
     write_map(path, SIDE, SIDE / 2, ramp);
-    assert_int_equal(bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, SIDE, map),
+    assert_int_equal(bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, key, NULL, SIDE, map),
                      BST_ERR_CONFIG);
     assert_non_null(strstr(f->ctx.message, "256 x 128"));
     remove(path);

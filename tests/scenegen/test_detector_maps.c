@@ -32,9 +32,9 @@ static void charge_is_gathered_on_the_way_to_the_output(void **state) {
             c.detector.overscan = (bst_detector_edges_config){6, 3, 2, 5};
         }
         const bst_detector_edges_config *o = &c.detector.overscan;
-        bst_assert_ok(&ctx, bst_readout_charge_map(&ctx, &c, KEY, STRIDE, map));
+        bst_assert_ok(&ctx, bst_readout_charge_map(&ctx, &c, KEY, NULL, STRIDE, map));
         if (!even) {
-            bst_assert_ok(&ctx, bst_fixed_pattern_noise_dark(&ctx, &c, KEY, STRIDE, dark));
+            bst_assert_ok(&ctx, bst_fixed_pattern_noise_dark(&ctx, &c, KEY, NULL, STRIDE, dark));
         }
         for (int y = 0; y < HEIGHT; y++) {
             for (int x = 0; x < WIDTH; x++) {
@@ -63,7 +63,7 @@ static void response_of_pixels(void **state) {
         .width_px = WIDTH,
         .height_px = HEIGHT,
         .detector = {.prnu_rms = 0.03, .shielded = {4, 0, 1, 2}, .overscan = {0, 7, 0, 3}}};
-    bst_assert_ok(&ctx, bst_fixed_pattern_noise_gain(&ctx, &c, KEY, STRIDE, gain));
+    bst_assert_ok(&ctx, bst_fixed_pattern_noise_gain(&ctx, &c, KEY, NULL, STRIDE, gain));
     double sum = 0.0, square = 0.0, beside = 0.0, n = 0.0;
     for (int y = 0; y < HEIGHT; y++) {
         for (int x = 0; x < WIDTH; x++) {
@@ -84,7 +84,7 @@ static void response_of_pixels(void **state) {
     bst_assert_close(beside / n, 0.0, 4.0 * 9e-4 / sqrt(n));
 
     c.detector = (bst_detector_config){.dead_fraction = 0.2};
-    bst_assert_ok(&ctx, bst_fixed_pattern_noise_gain(&ctx, &c, KEY, STRIDE, gain));
+    bst_assert_ok(&ctx, bst_fixed_pattern_noise_gain(&ctx, &c, KEY, NULL, STRIDE, gain));
     double dead = 0.0;
     for (int i = 0; i < STRIDE * HEIGHT; i++) {
         dead += i % STRIDE < WIDTH && gain[i] == 0.0f;
@@ -93,7 +93,7 @@ static void response_of_pixels(void **state) {
     bst_assert_close(dead, 0.2 * WIDTH * HEIGHT, 4.0 * sqrt(0.16 * WIDTH * HEIGHT));
 
     c.detector = (bst_detector_config){.bad_columns = 5};
-    bst_assert_ok(&ctx, bst_fixed_pattern_noise_gain(&ctx, &c, KEY, STRIDE, gain));
+    bst_assert_ok(&ctx, bst_fixed_pattern_noise_gain(&ctx, &c, KEY, NULL, STRIDE, gain));
     int columns = 0, began = 0;
     for (int x = 0; x < WIDTH; x++) {
         bool bad = false;
@@ -234,10 +234,38 @@ static void tracks_of_charge(void **state) {
     bst_cosmic_rays_free(h);
 }
 
+/* Maps are the same bits whichever thread draws their rows. */
+static void threads_draw_the_same_maps(void **state) {
+    (void)state;
+    static float maps[2][2][STRIDE * HEIGHT];
+    bst_ctx ctx = {0};
+    bst_camera c = {.width_px = WIDTH,
+                    .height_px = HEIGHT,
+                    .dark_current_e_per_s = 7.0,
+                    .detector = {.prnu_rms = 0.03,
+                                 .dead_fraction = 0.01,
+                                 .bad_columns = 2,
+                                 .dsnu_rms = 0.4,
+                                 .hot_fraction = 0.02,
+                                 .hot_median_e_per_s = 90.0,
+                                 .hot_spread_dex = 0.5,
+                                 .readout_s = 3.0}};
+    bst_parallel *pool;
+    bst_assert_ok(&ctx, bst_parallel_create(&ctx, 3, &pool));
+    for (int k = 0; k < 2; k++) {
+        bst_parallel *own = k ? pool : NULL;
+        bst_assert_ok(&ctx, bst_fixed_pattern_noise_gain(&ctx, &c, KEY, own, STRIDE, maps[k][0]));
+        bst_assert_ok(&ctx, bst_readout_charge_map(&ctx, &c, KEY, own, STRIDE, maps[k][1]));
+    }
+    assert_memory_equal(maps[0], maps[1], sizeof maps[0]);
+    bst_parallel_free(pool);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(charge_is_gathered_on_the_way_to_the_output),
         cmocka_unit_test(response_of_pixels),
+        cmocka_unit_test(threads_draw_the_same_maps),
         cmocka_unit_test(codes_of_a_square_root_law),
         cmocka_unit_test(shading_by_its_parameters),
         cmocka_unit_test(tracks_of_charge),

@@ -46,7 +46,7 @@ static void dark_current_of_pixels(void **state) {
                          .detector = {.dsnu_rms = 0.5}};
     const bst_rng_key key = {{5, 6}};
     double factor = bst_detector_dark_factor(&camera.detector);
-    bst_assert_ok(&ctx, bst_fixed_pattern_noise_dark(&ctx, &camera, key, STRIDE, dark));
+    bst_assert_ok(&ctx, bst_fixed_pattern_noise_dark(&ctx, &camera, key, NULL, STRIDE, dark));
     const double n = WIDTH * HEIGHT;
     double sum = 0.0, squares = 0.0, logs = 0.0, across = 0.0, down = 0.0;
     for (int y = 0; y < HEIGHT; y++) {
@@ -77,7 +77,7 @@ static void dark_current_of_pixels(void **state) {
         .hot_fraction = 0.1, .hot_median_e_per_s = 50.0, .hot_spread_dex = 0.3};
     factor = bst_detector_dark_factor(&camera.detector);
     memset(dark, 0, sizeof dark);
-    bst_assert_ok(&ctx, bst_fixed_pattern_noise_dark(&ctx, &camera, key, STRIDE, dark));
+    bst_assert_ok(&ctx, bst_fixed_pattern_noise_dark(&ctx, &camera, key, NULL, STRIDE, dark));
     double hot = 0.0, dex = 0.0, dex2 = 0.0;
     for (int i = 0; i < STRIDE * HEIGHT; i++) {
         if (dark[i] > 0.0f) {

@@ -100,7 +100,8 @@ static void traps_follow_their_equation(void **state) {
     f->camera.dark_current_e_per_s = 3.0;
     f->camera.detector.prnu_rms = 0.5;
     bst_renderer *r = make(f);
-    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, PATTERN, SIDE, gain));
+    bst_assert_ok(&f->ctx,
+                  bst_fixed_pattern_noise_gain(&f->ctx, &f->camera, PATTERN, NULL, SIDE, gain));
     memset(trapped, 0, sizeof trapped);
     double end_s = 0.0;
     for (int k = 0; k < (int)(sizeof shots / sizeof *shots); k++) {

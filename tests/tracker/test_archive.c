@@ -49,6 +49,7 @@ static void look_into(const bst_tracker *t, held *h) {
         h->confirmed += tracks[i].status == BST_TRACK_CONFIRMED;
         h->at_rest += tracks[i].at_rest;
         h->stars += tracks[i].star;
+        assert_true(!tracks[i].star || tracks[i].models.count == 0); /* its place is its state */
         h->mixtures += tracks[i].models.count > 1;
         h->orbits += tracks[i].orbit.valid;
         h->events += tracks[i].manoeuvre_end_s > 0.0;
@@ -272,6 +273,20 @@ static void damage_is_refused_or_another_state(void **state) {
         assert_int_equal(bst_tracker_archive(tracker, archive), BST_ERR_FORMAT);
         bst_archive_free(archive);
         *numbers[i] = right;
+    }
+    /* levels of process noise: more components of one than it may have, none that exists, and a
+     * time that is none */
+    const bst_filter_models right = track->models;
+    for (int i = 0; i < 3; i++) {
+        bst_archive *archive;
+        track->models.levels = i == 1 ? 2 : BST_FILTER_LEVELS;
+        track->models.count = i == 0 ? BST_FILTER_COMPONENTS / BST_FILTER_LEVELS + 1 : 1;
+        memset(track->models.level, 0, sizeof track->models.level);
+        track->models.unswitched_s = i == 2 ? NAN : 0.0;
+        bst_assert_ok(&ctx, bst_archive_create(&ctx, &archive));
+        assert_int_equal(bst_tracker_archive(tracker, archive), BST_ERR_FORMAT);
+        bst_archive_free(archive);
+        track->models = right;
     }
     bst_tracker_free(tracker);
     bst_tracker_free(other);

@@ -2,7 +2,7 @@
  * components with slanting covariances of direction and rate, so close together that the sphere is
  * flat between them. */
 #include "tests/test_support.h"
-#include "tracker/mtt/mixture.h"
+#include "tracker/mtt/filter.h"
 
 enum { COMPONENTS = 7 };
 
@@ -134,7 +134,37 @@ static void reduction_is_runnalls_rule(void **state) {
     }
 }
 
+/* A track whose components are given up, as when it splits, begins with all levels of process noise
+ * again: those of before are no longer those of its components. */
+static void a_new_mixture_has_new_levels(void **state) {
+    (void)state;
+    const bst_filter_params params = {.noise_rad2ps3 = 1e-14, .steady_noise_rad2ps3 = 1e-16};
+    bst_sky_state s = {.direction = {1, 0, 0}};
+    for (int i = 0; i < 4; i++) {
+        s.covariance[i][i] = i < 2 ? 1e-12 : 1e-14;
+    }
+    const bst_sky_measurement z = {.direction = {1, 0, 0}, .cov_11 = 1e-12, .cov_22 = 1e-12};
+    const bst_filter_candidate candidate = {.measurement = &z};
+    const bst_filter_evidence evidence = {&candidate, 1, 0.0, 1.0};
+    bst_filter_models models = {0};
+    bst_filter_update(&params, &s, &models, &evidence, BST_FILTER_COMPONENTS);
+    assert_int_equal(models.count, 1);
+    double first[BST_FILTER_LEVELS] = {0.0};
+    for (int k = 0; k < 2; k++) {
+        bst_filter_predict(&params, 1.0, &s, &models);
+        assert_int_equal(models.count, BST_FILTER_LEVELS);
+        for (int i = 0; i < models.count; i++) {
+            first[models.level[i]] = k == 0 ? models.probability[i] : first[models.level[i]];
+            bst_assert_close(models.probability[i], first[models.level[i]], 1e-15);
+        }
+        models.count = 0;
+        bst_filter_update(&params, &s, &models, &evidence, BST_FILTER_COMPONENTS);
+        assert_int_equal(models.count, 1);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(reduction_is_runnalls_rule)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(reduction_is_runnalls_rule),
+                                       cmocka_unit_test(a_new_mixture_has_new_levels)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

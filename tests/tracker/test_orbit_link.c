@@ -39,7 +39,7 @@ static void arcs_of_an_object_are_linked(void **state) {
             /* the low one within a revolution */
             const double at_s = k < 2 ? times_s[pass] : 600.0 + 1500.0 * pass;
             arc_of(k, at_s + 30.0 * k, 10 * pass + k, z);
-            const int at = bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S);
+            const int at = bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, DAY_S);
             if (pass == 0) {
                 item[k] = at;
             }
@@ -70,21 +70,21 @@ static void old_arcs_are_given_up(void **state) {
     bst_od_observation z[DIRECTIONS];
     l = (bst_od_linker){.count = 0};
     arc_of(0, 600.0, 1, z);
-    assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S), 0);
+    assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, DAY_S), 0);
     arc_of(0, 8000.0, 2, z);
-    assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, 7000.0), 1); /* 7382 s later */
+    assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, 7000.0), 1); /* 7382 s later */
     assert_int_equal(l.items[0].arcs, 1);
     arc_of(0, 14000.0, 3, z);
-    assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, 7000.0), 1);
+    assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, 7000.0), 1);
     assert_int_equal(l.items[1].arcs, 2);
     for (int i = 2; i < BST_OD_LINK_ORBITS; i++) {
         arc_of(1, 40000.0 + 10000.0 * i, i, z);
-        assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, 0.0), i);
+        assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, 0.0), i);
     }
     arc_of(1, 40000.0 + 10000.0 * BST_OD_LINK_ORBITS, 99, z);
-    assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, 0.0), 0);
+    assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, 0.0), 0);
     arc_of(1, 60000.0 + 10000.0 * BST_OD_LINK_ORBITS, 99, z);
-    assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, 0.0), 2); /* 1 is an orbit */
+    assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, 0.0), 2); /* 1 is an orbit */
 }
 
 /* Older directions make room: never more than the store has, in order of time. */
@@ -99,7 +99,7 @@ static void directions_are_thinned_out(void **state) {
         for (int i = 1; i < DIRECTIONS; i++) {
             z[i].shared_change = 0.125;
         }
-        assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S), 0);
+        assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, DAY_S), 0);
         assert_int_equal(l.items[0].arcs, pass + 1);
         assert_true(l.items[0].count <= BST_OD_LINK_DIRECTIONS);
         bst_assert_close(l.items[0].directions[l.items[0].count - 1].observer.time_s,
@@ -129,12 +129,37 @@ static void items_are_dropped(void **state) {
     l = (bst_od_linker){.count = 0};
     for (int k = 0; k < BODIES; k++) {
         arc_of(k, 600.0, k, z);
-        assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S), k);
+        assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, DAY_S), k);
     }
     bst_od_linker_drop(&l, 0);
     assert_true(l.count == 2 && l.items[0].id == 3 && l.items[1].id == 2);
     bst_od_linker_drop(&l, 1);
     assert_true(l.count == 1 && l.items[0].id == 3);
+}
+
+/* Long arcs that overlap in time: one sensor would have one track of an object, two sensors of a
+ * spacecraft have two of it. */
+static void two_sensors_may_see_one_object(void **state) {
+    (void)state;
+    static bst_od_linker l;
+    const bst_od_motion motion = {.forces = NULL};
+    bst_od_observation z[2][DIRECTIONS];
+    for (int k = 0; k < 2; k++) {
+        const scene s = {.body = body(1),
+                         .eye = from_elements(7.16e6, 0.001, 98.6, 40, 10, 0),
+                         .from_s = 600.0 + 700.0 * k,
+                         .to_s = 3000.0 + 700.0 * k,
+                         .count = DIRECTIONS,
+                         .sigma_rad = 0.3 * BST_ARCSEC_RAD};
+        observe(&s, k, z[k]);
+    }
+    for (int other = 0; other < 2; other++) {
+        l = (bst_od_linker){.count = 0};
+        assert_int_equal(bst_od_link_arc(&l, &motion, 4, z[0], DIRECTIONS, DAY_S), 0);
+        const int at = bst_od_link_arc(&l, &motion, 4 + other, z[1], DIRECTIONS, DAY_S);
+        assert_int_equal(at, other ? 0 : 1);
+        assert_int_equal(l.items[at].arcs, other ? 2 : 1);
+    }
 }
 
 static bst_status archive_linker(void *self, bst_archive *archive) {
@@ -150,7 +175,7 @@ static void a_linker_is_saved_and_restored(void **state) {
     l = back = (bst_od_linker){.count = 0};
     for (int k = 0; k < 2; k++) {
         arc_of(k, 600.0, k, z);
-        (void)bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S);
+        (void)bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, DAY_S);
     }
     test_saved saved = test_save(archive_linker, &l);
     bst_assert_ok(&ctx, test_restore(&ctx, archive_linker, &back, saved));
@@ -188,11 +213,11 @@ static void tracks_at_one_time_are_not_linked(void **state) {
     l = (bst_od_linker){.count = 0};
     for (int k = 0; k < 2; k++) {
         arc_of(0, 600.0 + k, k, z);
-        assert_int_equal(bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S), k);
+        assert_int_equal(bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, DAY_S), k);
         assert_int_equal(l.items[k].arcs, 1);
     }
     arc_of(0, 8000.0, 2, z);
-    const int at = bst_od_link_arc(&l, &motion, z, DIRECTIONS, DAY_S);
+    const int at = bst_od_link_arc(&l, &motion, 0, z, DIRECTIONS, DAY_S);
     assert_int_equal(l.items[at].arcs, 2);
     assert_int_equal(l.count, 2);
 }
@@ -203,6 +228,7 @@ int main(void) {
                                        cmocka_unit_test(old_arcs_are_given_up),
                                        cmocka_unit_test(directions_are_thinned_out),
                                        cmocka_unit_test(items_are_dropped),
+                                       cmocka_unit_test(two_sensors_may_see_one_object),
                                        cmocka_unit_test(a_linker_is_saved_and_restored)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -227,8 +227,7 @@ static void doubts_of_a_track(void **state) {
                                          .cov_22 = pow(45 * MAS, 2)},
                                  .v_mag = 10.9,
                                  .v_mag_sigma = 0.2};
-    const bst_mtt_params params = {
-        .merge_rad = MERGE_RAD, .merge_floor_rad = 30 * MAS, .detection_probability = 0.8};
+    const bst_mtt_params params = {.merge_rad = MERGE_RAD, .merge_floor_rad = 30 * MAS};
     bst_mtt_merged fit;
     assert_true(bst_mtt_merge(&a, &b, &z.sky, params.merge_floor_rad, &fit));
     double both = -2.5 * log10(pow(10, -0.4 * a.v_mag) + pow(10, -0.4 * b.v_mag));
@@ -238,7 +237,7 @@ static void doubts_of_a_track(void **state) {
     const double alone_density = 0.5 * exp(fit.log_likelihood) * light;
     double merged = exists * unresolved * exp(fit.log_likelihood) * light;
     double single = ((1 - exists) + exists * (1 - unresolved) * (1 - 0.8)) * alone_density;
-    bst_mtt_doubtful found = bst_mtt_doubt_of_track(&params, &a, &b, &z, log(alone_density));
+    bst_mtt_doubtful found = bst_mtt_doubt_of_track(&params, &a, &b, &z, 0.8, log(alone_density));
     double one[2], two[2], c1[3], c2[3];
     const double of_z[3] = {z.sky.cov_11, z.sky.cov_12, z.sky.cov_22},
                  of_a[3] = {fit.of_a.cov_11, fit.of_a.cov_12, fit.of_a.cov_22};

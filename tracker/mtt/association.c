@@ -116,7 +116,9 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
         bst_mtt_fade_alarms(mtt);
     }
     for (int i = 0; i < mtt->now.count; i++) {
-        bool alarm = jointly ? mtt->joint.claimed_firm[i] <= 0.5 : !mtt->now.used[i];
+        const int owner = mtt->owner[i]; /* of a split, or by the gate of manoeuvres */
+        const bool firm = owner >= 0 && mtt->tracks[owner].status != BST_TRACK_TENTATIVE;
+        bool alarm = jointly ? mtt->joint.claimed_firm[i] <= 0.5 && !firm : !mtt->now.used[i];
         unexplained += !mtt->now.used[i];
         unused += alarm;
         if (alarm && !partial) {

@@ -396,6 +396,7 @@ static void update_mixture(const bst_sky_state *state, bst_filter_models *models
                               weights, n);
     }
     if (models->count == 0) {
+        models->levels = 0;
         n = branch_hypotheses(state, 0.0, evidence, hypotheses, weights, 0);
     }
     if (n == 0) {

@@ -102,8 +102,9 @@ static void doubt(const bst_mtt *m, int t, bst_joint_hypothesis *h, double singl
             bst_sky_distance2(&track->state, &other->state) < SAME_CHI2) {
             continue;
         }
-        bst_mtt_doubtful both = bst_mtt_doubt_of_track(
-            &m->params, track, other, &m->now.items[h->column], single_log_likelihood);
+        bst_mtt_doubtful both =
+            bst_mtt_doubt_of_track(&m->params, track, other, &m->now.items[h->column],
+                                   bst_mtt_detection_probability(m, other), single_log_likelihood);
         if (both.merged > h->merged) {
             h->merged = both.merged;
             h->sky = both.sky;

@@ -67,7 +67,8 @@ static bool is_alone(const bst_mtt *m, int t) {
 static choice choose_detection(const bst_mtt *m, int t, const hypothesis *h) {
     const bst_mtt_params *p = &m->params;
     const bst_mtt_track *track = &m->tracks[t];
-    choice best = {.column = -1, .cost = -log(1.0 - p->detection_probability)};
+    const double pd = bst_mtt_detection_probability(m, track);
+    choice best = {.column = -1, .cost = -log(1.0 - pd)};
     double spread = h->state.covariance[0][0] + h->state.covariance[1][1];
     double radius = sqrt(p->gate_chi2 * (spread + m->largest_sigma * m->largest_sigma));
     int begin, end;
@@ -89,8 +90,7 @@ static choice choose_detection(const bst_mtt *m, int t, const hypothesis *h) {
         if (steady && (quiet.chi2 <= p->gate_chi2 || !is_alone(m, t))) {
             continue; /* the association has judged it, or it may be a neighbour's */
         }
-        double cost = -fmax(manoeuvre, quiet.log_likelihood) + log(m->clutter_density) -
-                      log(p->detection_probability) +
+        double cost = -fmax(manoeuvre, quiet.log_likelihood) + log(m->clutter_density) - log(pd) +
                       bst_mtt_brightness_cost(track, &m->now.items[column]);
         if (cost < best.cost) {
             double area = BST_PI * fit.innovation.chi2 * exp(0.5 * fit.innovation.log_det_s);
@@ -128,7 +128,7 @@ void bst_mtt_gate_manoeuvres(bst_mtt *m) {
         m->now.used[best.column] = true;
         m->owner[best.column] = t;
         if (!best.steady && exp(-0.5 * best.quiet_chi2) < allowed &&
-            (1.0 - p->detection_probability) * best.alarms < allowed) {
+            (1.0 - bst_mtt_detection_probability(m, track)) * best.alarms < allowed) {
             m->departed_chi2[t] = best.quiet_chi2;
         }
     }

@@ -243,7 +243,7 @@ static void update_filter(bst_mtt *m, int t) {
     int given = m->detection_of_track[t];
     bool weighs = m->params.association == BST_MTT_PDA || m->params.association == BST_MTT_MIXTURE;
     bool apart = m->params.association >= BST_MTT_MIXTURE && m->params.filter != BST_FILTER_IMM;
-    int components = apart ? BST_FILTER_COMPONENTS : 1;
+    int components = apart && !track->star ? BST_FILTER_COMPONENTS : 1;
     bst_filter_candidate candidates[BST_MTT_CANDIDATES];
     if (m->params.association == BST_MTT_PMB && bst_mtt_joint_update(m, t, components)) {
         return;
@@ -305,7 +305,8 @@ static void update_track(bst_mtt *m, int t) {
     double chi2 = track->models.levels > 0 ? fit.innovation.chi2 : fit.chi2;
     track->chi2 += chi2;
     track->last_chi2 = chi2;
-    track->score += log(m->params.detection_probability / m->clutter_density) + fit.log_likelihood;
+    track->score +=
+        log(bst_mtt_detection_probability(m, track) / m->clutter_density) + fit.log_likelihood;
     bst_mtt_note_place(track, detection);
     bst_mtt_note_fixed(m, detection, fit.log_likelihood, track);
     track->last_update_tick = m->now.tick;
@@ -418,7 +419,9 @@ static void maintain_tracks(bst_mtt *m, const bst_mtt_frame *frame) {
         track->frames += m->observable[t];
         if (track->may_miss && !taken) {
             track->misses_in_row++;
-            track->score += log(1.0 - bst_mtt_detection_probability(m, track));
+            if (m->detection_of_track[t] >= 0) { /* of another's light: else it is in the score */
+                track->score += log(1.0 - bst_mtt_detection_probability(m, track));
+            }
         }
         bool at_rest = taken && bst_mtt_is_at_rest(m, frame, track);
         if (at_rest && bst_mtt_is_star(m, frame, track)) {
@@ -441,15 +444,14 @@ static void maintain_tracks(bst_mtt *m, const bst_mtt_frame *frame) {
             record_event(m, resumed ? BST_MTT_RESUMED : BST_MTT_CONFIRMED, track, 0.0);
         }
     }
-    int kept = 0;
-    m->rest_count = 0;
+    int kept = 0, at_rest = 0; /* rest_count is asked until all have been looked at */
     for (int t = 0; t < m->track_count; t++) {
         const bst_mtt_track *track = &m->tracks[t];
         if (track->replaced) {
             continue;
         }
         if (!must_delete(m, track, m->observable[t])) {
-            m->rest_count += track->at_rest;
+            at_rest += track->at_rest;
             if (kept != t) {
                 m->tracks[kept] = *track;
             }
@@ -460,6 +462,7 @@ static void maintain_tracks(bst_mtt *m, const bst_mtt_frame *frame) {
         }
     }
     m->track_count = kept;
+    m->rest_count = at_rest;
 }
 
 /* Stores the frame's unused detections for two-point initiation in later frames. */

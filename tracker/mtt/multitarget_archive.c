@@ -3,15 +3,21 @@
 
 /* True if the numbers of a track by which arrays are accessed are in range. */
 static bool is_intact(const bst_mtt_track *track) {
-    for (int i = 0; i < BST_FILTER_COMPONENTS; i++) {
-        if ((unsigned)track->models.level[i] >= BST_FILTER_LEVELS) {
+    const bst_filter_models *models = &track->models;
+    if ((models->levels != 0 && models->levels != BST_FILTER_LEVELS) || models->count < 0 ||
+        models->count > BST_FILTER_COMPONENTS) {
+        return false;
+    }
+    int of_level[BST_FILTER_LEVELS] = {0};
+    for (int i = 0; models->levels > 0 && i < models->count; i++) {
+        if ((unsigned)models->level[i] >= BST_FILTER_LEVELS ||
+            ++of_level[models->level[i]] > BST_FILTER_COMPONENTS / BST_FILTER_LEVELS) {
             return false;
         }
     }
-    return (unsigned)track->models.levels <= BST_FILTER_LEVELS &&
+    return isfinite(models->unswitched_s) && models->unswitched_s >= 0.0 &&
            (unsigned)track->status <= BST_TRACK_COASTING &&
-           (unsigned)track->sight <= BST_MTT_EARTH && track->models.count >= 0 &&
-           track->models.count <= BST_FILTER_COMPONENTS && track->innovation_count >= 0 &&
+           (unsigned)track->sight <= BST_MTT_EARTH && track->innovation_count >= 0 &&
            track->brightness_count >= 0;
 }
 

@@ -158,7 +158,7 @@ void bst_mtt_note_snr(const bst_mtt *mtt, double snr, bst_mtt_track *track);
 /* Updates it by a frame that may have detected the object and did not. */
 void bst_mtt_note_missed(const bst_mtt *mtt, bst_mtt_track *track);
 /* Updates the probability that the object of track t is dark, and by a miss its SNR, after the
- * association. */
+ * association, and its score by the miss. */
 void bst_mtt_note_darkness(const bst_mtt *mtt, int t);
 /* Updates a track's brightness in full sunlight after a detection, if it is in full sunlight. */
 void bst_mtt_note_light(bst_mtt_track *track);

@@ -169,6 +169,7 @@ bool bst_mtt_merge(const bst_mtt_track *a, const bst_mtt_track *b,
 
 bst_mtt_doubtful bst_mtt_doubt_of_track(const bst_mtt_params *params, const bst_mtt_track *a,
                                         const bst_mtt_track *b, const bst_mtt_detection *detection,
+                                        double detection_probability,
                                         double single_log_likelihood) {
     assert(params && a && b && detection);
     bst_mtt_merged fit;
@@ -177,8 +178,7 @@ bst_mtt_doubtful bst_mtt_doubt_of_track(const bst_mtt_params *params, const bst_
     }
     double unresolved = fmin(bst_mtt_unresolved(params->merge_rad, a, b), 0.999);
     double exists = fmin(1.0, b->existence / a->existence);
-    double alone =
-        1.0 - exists + exists * (1.0 - unresolved) * (1.0 - params->detection_probability);
+    double alone = 1.0 - exists + exists * (1.0 - unresolved) * (1.0 - detection_probability);
     double log_ratio = log(exists * unresolved / alone) + fit.log_likelihood -
                        bst_mtt_merged_brightness_cost(a, b, detection) - single_log_likelihood;
     double p = 1.0 / (1.0 + exp(-log_ratio));

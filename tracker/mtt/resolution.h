@@ -49,11 +49,12 @@ bst_mtt_doubtful bst_mtt_doubt_of_pair(double merge_rad, double detection_probab
  * does with the ratio of their existence probabilities, at most 1. In the first case
  * b does not exist or is missed.
  *
- * Given:     single_log_likelihood  of the detection, of a alone, with the brightness, rad^-2
- *            floor_rad  as in bst_mtt_merge */
+ * Given:     params                 merge_rad and merge_floor_rad
+ *            detection_probability  of b
+ *            single_log_likelihood  of the detection, of a alone, with the brightness, rad^-2 */
 bst_mtt_doubtful bst_mtt_doubt_of_track(const bst_mtt_params *params, const bst_mtt_track *a,
                                         const bst_mtt_track *b, const bst_mtt_detection *detection,
-                                        double single_log_likelihood);
+                                        double detection_probability, double single_log_likelihood);
 
 /* Brightness term (-ln likelihood, at most 4.5) of a detection of the light of a and b together. */
 double bst_mtt_merged_brightness_cost(const bst_mtt_track *a, const bst_mtt_track *b,

@@ -32,10 +32,11 @@ static bool judge(const bst_mtt *m, int t, pair *p) {
     }
     double area = BST_PI * m->params.merge_rad * m->params.merge_rad;
     double pd = m->params.detection_probability, beta = m->alarm_density;
+    double missed = 1.0 - bst_mtt_detection_probability(m, track);
     bst_mtt_detection both = *a;
     both.v_mag += 2.5 * log10(p->share);
     p->log_odds = log(area / m->params.field_sr) + 2.0 * log(pd / beta) - log(area) +
-                  fit.log_likelihood - log(1.0 - pd) - bst_mtt_brightness_cost(track, &both);
+                  fit.log_likelihood - log(missed) - bst_mtt_brightness_cost(track, &both);
     return true;
 }
 
@@ -88,6 +89,7 @@ static void take(bst_mtt *m, int t, int column, bst_vec3 centre, double interval
     const bst_mtt_detection *d = &m->now.items[column];
     widen(track, bst_vec3_sub(d->sky.direction, centre), interval_s);
     m->detection_of_track[t] = column;
+    m->owner[column] = t;
     m->shared[t] = BST_MTT_ALONE;
     m->joint.decided[t] = m->joint.head[t] = -1;
     m->departed_chi2[t] = 0.0;

@@ -101,7 +101,8 @@ void bst_mtt_note_darkness(const bst_mtt *m, int t) {
     if (m->detection_of_track[t] >= 0) {
         track->dark = 0.0;
     } else if (track->may_miss) {
-        double pd = bst_mtt_detection_probability(m, track);
+        double pd = bst_mtt_detection_probability(m, track); /* before this miss */
+        track->score += log(1.0 - pd);
         bst_mtt_note_missed(m, track);
         track->dark /= 1.0 - pd * (1.0 - track->dark);
     }

@@ -11,9 +11,6 @@ static const double MOST_SIGMAS = 5.0;
  * most_iterations and most_failures. */
 static const double LEAST_GAIN = 1e-3;
 enum { MOST_ITERATIONS = 25, MOST_FAILURES = 4 };
-/* Observers nearer to each other than this are one, m: the error of uniform motion in ten
- * seconds is less. */
-static const double ITSELF_M = 500.0;
 
 /* Largest chi-square of directions that fit an orbit. */
 static double most_chi2(int count) {
@@ -56,22 +53,14 @@ static int join(const bst_od_linked *item, const bst_od_observation *arc, int co
     return n;
 }
 
-/* Whether an arc and one that waits are of two tracks which an observer had at the same time, and
- * so of two objects. */
-static bool is_beside(const bst_od_linked *item, const bst_od_observation *arc, int count) {
+/* Whether an arc and one that waits are of two tracks which a sensor had at the same time, and so
+ * of two objects. */
+static bool is_beside(const bst_od_linked *item, int64_t sensor, const bst_od_observation *arc,
+                      int count) {
     const bst_od_observation *own = item->directions;
-    const double from_s = arc[0].observer.time_s, to_s = arc[count - 1].observer.time_s;
-    if (item->arcs > 1 || from_s > own[item->count - 1].observer.time_s ||
-        to_s < own[0].observer.time_s) {
-        return false;
-    }
-    int i = 0;
-    while (i + 1 < item->count && own[i].observer.time_s < from_s) {
-        i++;
-    }
-    const bst_od_observer *a = &own[i].observer, *b = &arc[0].observer;
-    const bst_vec3 moved = bst_vec3_axpy(a->position_m, b->time_s - a->time_s, a->velocity_mps);
-    return bst_vec3_norm(bst_vec3_sub(moved, b->position_m)) < ITSELF_M;
+    return item->arcs == 1 && item->sensor == sensor &&
+           arc[0].observer.time_s <= own[item->count - 1].observer.time_s &&
+           arc[count - 1].observer.time_s >= own[0].observer.time_s;
 }
 
 /* Fits an orbit to an item's directions and those of an arc. False: they do not fit. */
@@ -95,6 +84,7 @@ static bool fits(const bst_od_linked *item, const bst_od_motion *motion,
     out->state = found.state;
     out->chi2 = found.chi2;
     out->id = item->id;
+    out->sensor = item->sensor;
     return true;
 }
 
@@ -113,7 +103,7 @@ static int place_of(bst_od_linker *l) {
     return oldest;
 }
 
-int bst_od_link_arc(bst_od_linker *l, const bst_od_motion *motion,
+int bst_od_link_arc(bst_od_linker *l, const bst_od_motion *motion, int64_t sensor,
                     const bst_od_observation *directions, int count, double within_s) {
     assert(l && motion && directions && count >= BST_OD_LEAST &&
            count <= BST_OD_LINK_DIRECTIONS / 2);
@@ -127,7 +117,7 @@ int bst_od_link_arc(bst_od_linker *l, const bst_od_motion *motion,
             bst_od_linked now = {.arcs = 0}; /* all bytes are in a saved state */
             if ((item->arcs == 1) == (waiting == 1) &&
                 directions[0].observer.time_s - last_s <= within_s &&
-                !is_beside(item, directions, count) &&
+                !is_beside(item, sensor, directions, count) &&
                 fits(item, motion, directions, count, &now) &&
                 (chosen < 0 || now.chi2 - 2.0 * now.count < best.chi2 - 2.0 * best.count)) {
                 best = now;
@@ -137,7 +127,7 @@ int bst_od_link_arc(bst_od_linker *l, const bst_od_motion *motion,
     }
     if (chosen < 0) {
         chosen = place_of(l);
-        best = (bst_od_linked){.arcs = 1, .count = count, .id = ++l->made};
+        best = (bst_od_linked){.arcs = 1, .count = count, .id = ++l->made, .sensor = sensor};
         memcpy(best.directions, directions, (size_t)count * sizeof *directions);
     }
     l->items[chosen] = best;
