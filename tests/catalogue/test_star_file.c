@@ -135,9 +135,9 @@ static void test_inconsistent(void **state) {
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
         refuse_nan(f, cell - offsetof(bst_star_cell, first) + places[i], false, "sky cell 500");
     }
-    static const size_t of_patch[] = {
-        offsetof(bst_star_patch, ra_deg), offsetof(bst_star_patch, dec_deg),
-        offsetof(bst_star_patch, radius_deg)};
+    static const size_t of_patch[] = {offsetof(bst_star_patch, ra_deg),
+                                      offsetof(bst_star_patch, dec_deg),
+                                      offsetof(bst_star_patch, radius_deg)};
     for (size_t i = 0; i < sizeof of_patch / sizeof *of_patch; i++) {
         refuse_nan(f, sizeof h + 2 * sizeof(bst_star_patch) + of_patch[i], true, "patch 2");
     }

@@ -151,9 +151,9 @@ static void a_sighting_counts_at_its_time(void **state) {
     assert_int_equal(f.tasking.sensors[0].task.object, -1);
     const double known = 510.0 * 510.0 + pow(drift_mps * seen_s, 2);
     const double said = 400.0 * 400.0 + 38.0 * 38.0;
-    bst_assert_close(pow(bst_tasking_sigma_m(&f.tasking, GX5, seen_s), 2) *
-                         (1.0 / known + 1.0 / said),
-                     1.0, 0.01); /* the track's 38 m, which the angle to the motion makes more */
+    bst_assert_close(
+        pow(bst_tasking_sigma_m(&f.tasking, GX5, seen_s), 2) * (1.0 / known + 1.0 / said), 1.0,
+        0.01); /* the track's 38 m, which the angle to the motion makes more */
     tear_down(&f);
 }
 

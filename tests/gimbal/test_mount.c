@@ -343,7 +343,6 @@ static void over_the_pole_is_the_shorter_way(void **state) {
         for (int n = 0; n < 24000; n++) {
             bst_mount_step(&m, &body, &c, 0.0, true);
             limited = limited || m.limited;
-            assert_false(m.servo[0].stuck || m.servo[1].stuck); /* whichever way it turns */
         }
         bst_assert_close(fabs(m.servo[0].unwrapped_rad), fabs(cases[k].outer) * BST_DEG_RAD, 1e-4);
         assert_true(cases[k].outer == 180 || m.servo[0].unwrapped_rad * cases[k].outer > 0.0);

@@ -161,10 +161,11 @@ static void it_points_by_what_it_believes(void **state) {
     (void)state;
     for (int type = 0; type < 2; type++) {
         fixture f;
-        open_simulation(&f, types[type],
-                        "\"platform\": {\"telemetry_rate_hz\": 50, \"nav_rate_hz\": 4, "
-                        "\"attitude_bias_arcsec\": [40, -30, 20], \"drift_arcsec_per_s\": [1800, 3000, "
-                        "-2400]}");
+        open_simulation(
+            &f, types[type],
+            "\"platform\": {\"telemetry_rate_hz\": 50, \"nav_rate_hz\": 4, "
+            "\"attitude_bias_arcsec\": [40, -30, 20], \"drift_arcsec_per_s\": [1800, 3000, "
+            "-2400]}");
         const double outer = 25.0 * BST_DEG_RAD, inner = -40.0 * BST_DEG_RAD;
         const double rate = 0.2 * BST_DEG_RAD, seconds = 20.0;
         bst_vec3 d = pointed(type, outer, inner);

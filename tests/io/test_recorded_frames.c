@@ -309,7 +309,8 @@ static void test_limits(void **state) {
                                   2.0 * most};
         for (int k = 0; k < 4; k++) {
             bst_keyword_map map = sound;
-            bst_keyword_number *number = (bst_keyword_number *)(void *)((char *)&map + limits[i].at);
+            bst_keyword_number *number =
+                (bst_keyword_number *)(void *)((char *)&map + limits[i].at);
             *number = (bst_keyword_number){.factor = 1.0, .value = values[k]};
             bool good = k == 1 || k == 2;
             assert_int_equal(try_file(&f, &map), good ? BST_OK : BST_ERR_FORMAT);
@@ -468,8 +469,9 @@ int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pixels),     cmocka_unit_test(test_keywords_and_sections),
         cmocka_unit_test(test_cube_table), cmocka_unit_test(test_messages),
-        cmocka_unit_test(test_limits), cmocka_unit_test(test_truncated),  cmocka_unit_test(test_mutations),
-        cmocka_unit_test(test_files),      cmocka_unit_test(test_rate_trend),
+        cmocka_unit_test(test_limits),     cmocka_unit_test(test_truncated),
+        cmocka_unit_test(test_mutations),  cmocka_unit_test(test_files),
+        cmocka_unit_test(test_rate_trend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

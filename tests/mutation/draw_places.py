@@ -22,8 +22,9 @@ import sys
 
 SOURCES = re.compile(r"(sim|scenegen|imgproc|tracker|control|gimbal|obsgen)/.*\.c$")
 WITHOUT_FORMULAS = re.compile(r"sim/(app|core|link|device|registry|cli|bench|api|engine|studies)/")
-PROGRAM = re.compile(r"sim/(app|run|export|report|engine|io|link|messages|api|analysis/(check|pd|score|camera|calibration|loop|characterize|new"
-                     r"|challenge|solve)|process|world|studies|study_kinds|onboard)/|.*module.*\.c$|.*config\.c$|tracker/catalogue|view/")
+PROGRAM = re.compile(r"sim/(app|run|export|report|engine|io|link|messages|api|process|world|studies|study_kinds|onboard)/"
+                     r"|sim/analysis/(check|pd|score|camera|calibration|loop|characterize|new|challenge|solve)/"
+                     r"|.*module.*\.c$|.*config\.c$|tracker/catalogue|view/")
 QUANTITY = re.compile(r"_(px|rad|radps|s|m|mps|e|deg|gcrf\w*|w|k|mag|snr|m2)\b|\.[xyz]\b|sqrt|cos\(|sin\(|bst_(vec3|quat|mat3)|0\.5"
                       r"|covarian|\[[012]\]|exp\(|log|binning|variance|sigma")
 AROUND, LEAST = 5, 6  # lines shown on each side; lines with quantities that a file must have

@@ -218,8 +218,8 @@ static void a_failed_update_is_counted(void **state) {
     bst_world_free(world);
 }
 
-/* GX5, called A, of 12 m^2, and C, with a mean anomaly of its own; the observer has two sensors, the
- * second one with images of twice the width. */
+/* GX5, called A, of 12 m^2, and C, with a mean anomaly of its own; the observer has two sensors,
+ * the second one with images of twice the width. */
 static bst_world *world_with_neighbour(const scratch *place, const char *anomaly) {
     char text[256], objects[2048], line[70];
     snprintf(line, sizeof line, "2 44802   0.0366 343.6423 0001933 100.2390 %s  1.00270919  944",

@@ -1,5 +1,5 @@
-/* Facets that others cross, of a round end with many corners and a small plate that stands in it near
- * its rim, all round. */
+/* Facets that others cross, of a round end with many corners and a small plate that stands in it
+ * near its rim, all round. */
 #include "sim/satellite/facet_net.h"
 #include "tests/satellite/satellite_support.h"
 

@@ -70,8 +70,8 @@ static void shadows_of_spheres(void **state) {
     bst_occultation_free(w);
 }
 
-/* Share of the Sun's light, its limb darkened by 0.6, that a disc of `radius` at a distance from the
- * middle covers; in radii of the Sun's disc. */
+/* Share of the Sun's light, its limb darkened by 0.6, that a disc of `radius` at a distance from
+ * the middle covers; in radii of the Sun's disc. */
 static double covered(double radius, double distance) {
     enum { PARTS = 400 };
     double in = 0.0, all = 0.0;
@@ -254,9 +254,11 @@ static void light_takes_time_between_bodies(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spheres_hide_by_their_discs),      cmocka_unit_test(shadows_of_spheres),
+        cmocka_unit_test(spheres_hide_by_their_discs),
+        cmocka_unit_test(shadows_of_spheres),
         cmocka_unit_test(shadows_off_the_middle),
-        cmocka_unit_test(shapes_hide_by_their_silhouettes), cmocka_unit_test(light_is_taken_away),
+        cmocka_unit_test(shapes_hide_by_their_silhouettes),
+        cmocka_unit_test(light_is_taken_away),
         cmocka_unit_test(light_takes_time_between_bodies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
