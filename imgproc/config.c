@@ -29,6 +29,11 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Detections per frame that noise alone may cause, on average."),
     BST_REAL(bst_imgproc_config, jitter_px, "px", 0, 5, "0",
              "RMS per axis of the line-of-sight jitter that widens the onboard PSF."),
+    BST_REAL(
+        bst_imgproc_config, motion_bend_px, "px", 0, 5, "0",
+        "RMS per axis by which an exposure's path bends beside what the telemetry shows, as of "
+        "a servo that follows its encoder's noise: streaks are displaced together by it. "
+        "Jitter adds 0.075 of jitter_px."),
     BST_REAL(bst_imgproc_config, streak_min_px, "px", 0.5, 100, "1.5",
              "Star streaks shorter than this are taken for points."),
     BST_REAL(bst_imgproc_config, streak_max_px, "px", 1, 128, "64",

@@ -36,6 +36,7 @@ typedef struct bst_imgproc_config {
     int64_t mesh_px;               /* side of a background mesh */
     double false_alarms_per_frame; /* expected from noise alone */
     double jitter_px;              /* RMS jitter per axis by which the PSF is broadened */
+    double motion_bend_px;         /* RMS bend per axis that neither telemetry nor jitter has */
     double streak_min_px, streak_max_px;
     bool long_streaks;       /* find star streaks beyond streak_max_px by their path */
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */

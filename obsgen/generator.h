@@ -14,7 +14,8 @@
 typedef struct bst_generator_settings {
     int capacity;
     double false_alarms_per_frame;
-    double jitter_px; /* RMS jitter per axis, sensor px, that widens the onboard PSF */
+    double jitter_px;      /* RMS jitter per axis, sensor px, that widens the onboard PSF */
+    double motion_bend_px; /* RMS bend per axis that neither telemetry nor jitter has, sensor px */
     double streak_min_px, streak_max_px; /* star streaks for which a streak filter is used */
     int mesh_px;                         /* side of a mesh of background and noise, px; 0: 64 */
     double false_splits; /* share of single sources that the pair test may split; 0: no pair test */

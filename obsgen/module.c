@@ -26,8 +26,8 @@ typedef struct obsgen_config {
     /* defaults from scenegen and imgproc if the sensor has them */
     double star_limit_v_mag, margin_px;
     int64_t truth_capacity, capacity, mesh_px;
-    double false_alarms_per_frame, jitter_px, streak_min_px, streak_max_px, search_radius_px,
-        false_splits, match_tolerance_px;
+    double false_alarms_per_frame, jitter_px, motion_bend_px, streak_min_px, streak_max_px,
+        search_radius_px, false_splits, match_tolerance_px;
     int column_correction, attitude;
     int64_t lost_after_frames;
 } obsgen_config;
@@ -56,6 +56,9 @@ static const bst_config_desc config_table[] = {
              "test" OF_OTHERS "."),
     BST_REAL(obsgen_config, jitter_px, "px", 0, 5, "0",
              "RMS per axis of the line-of-sight jitter that widens the onboard PSF" OF_OTHERS "."),
+    BST_REAL(obsgen_config, motion_bend_px, "px", 0, 5, "0",
+             "RMS per axis by which an exposure's path bends beside what telemetry and jitter_px "
+             "show" OF_OTHERS "."),
     BST_REAL(obsgen_config, streak_min_px, "px", 0.5, 100, "1.5",
              "Star streaks shorter than this are taken for points" OF_OTHERS "."),
     BST_REAL(obsgen_config, streak_max_px, "px", 1, 128, "64",
@@ -174,6 +177,7 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
                                              .false_alarms_per_frame = c->false_alarms_per_frame,
                                              .false_splits = c->false_splits,
                                              .jitter_px = c->jitter_px,
+                                             .motion_bend_px = c->motion_bend_px,
                                              .streak_min_px = c->streak_min_px,
                                              .streak_max_px = c->streak_max_px,
                                              .mesh_px = (int)c->mesh_px,

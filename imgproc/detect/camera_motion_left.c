@@ -9,7 +9,7 @@ static const double DRIFT_PX = 1.0;
 
 /* 1 sigma per axis of the bend before it is measured on streaks, sensor px. */
 static double unknown_bend_px(const bst_imgproc *ip, const bst_camera_motion *motion) {
-    return hypot(JITTER_BEND * ip->config.jitter_px,
+    return hypot(hypot(JITTER_BEND * ip->config.jitter_px, ip->config.motion_bend_px),
                  motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
 }
 

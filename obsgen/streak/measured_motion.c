@@ -70,7 +70,8 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
     g->fit_path = g->star_path;
     g->fit_bend_x = g->bend_x;
     g->fit_bend_y = g->bend_y;
-    double prior = hypot(JITTER_BEND * g->settings.jitter_px, f->bend_sigma_px) / g->binning;
+    double own = hypot(JITTER_BEND * g->settings.jitter_px, g->settings.motion_bend_px);
+    double prior = hypot(own, f->bend_sigma_px) / g->binning;
     g->bend_before = g->bend_after = prior;
     double snr2 = snr2_of_stars(g, f->truth), length = g->streak;
     if (g->smeared || g->path.count < 3 || !(length >= LEAST_PATH_SIGMAS * g->fitted_sigma) ||

@@ -97,7 +97,7 @@ static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, const bst_scen
             c->figures.unknown++;
             continue;
         }
-        /* half the radius of a sphere as large as the object is catalogued */
+        /* half the radius of a sphere as large as the object is catalogued, by the phase angle */
         double photocentre_m = 0.5 * sqrt(info->area_m2 / BST_PI);
         bst_status status =
             bst_custody_orbit_init(ctx, elements, offset_s, photocentre_m, &c->orbits[i]);
@@ -354,12 +354,14 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
  * it turns by 6e-8 rad. */
 static bst_custody_observation middle_of(const bst_run_arc *arc) {
     const bst_od_observation *d = &arc->directions[arc->count / 2];
-    return (bst_custody_observation){
-        .observer = d->observer,
-        .gcrf_from_teme = arc->gcrf_from_teme[0],
-        .direction = d->direction,
-        .covariance = {
-            {d->cov_11, d->cov_12}, {d->cov_12, d->cov_22}, {[2] = OPEN_RATE}, {[3] = OPEN_RATE}}};
+    return (bst_custody_observation){.observer = d->observer,
+                                     .gcrf_from_teme = arc->gcrf_from_teme[0],
+                                     .direction = d->direction,
+                                     .covariance = {{d->cov_11, d->cov_12},
+                                                    {d->cov_12, d->cov_22},
+                                                    {[2] = OPEN_RATE},
+                                                    {[3] = OPEN_RATE}},
+                                     .photocentre_factor = d->photocentre_factor};
 }
 
 /* Finds the object of an arc by its last state. If that is in no one's gate, or is another's in

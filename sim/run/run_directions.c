@@ -86,8 +86,10 @@ bst_status bst_run_centroids_add(bst_ctx *ctx, bst_run_centroids *c, const bst_d
     c->frames[frame].exposure_id = d->exposure_id;
     for (int i = 0; i < d->count; i++) {
         const bst_detection *from = &d->items[i];
-        c->frames[frame].items[i] =
-            (bst_run_centroid){from->x_px, from->y_px, {from->cov_xx, from->cov_xy, from->cov_yy}};
+        c->frames[frame].items[i] = (bst_run_centroid){from->x_px,
+                                                       from->y_px,
+                                                       {from->cov_xx, from->cov_xy, from->cov_yy},
+                                                       (double)(d->end_tick - d->start_tick)};
     }
     return BST_OK;
 }

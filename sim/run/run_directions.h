@@ -32,6 +32,7 @@ double bst_run_change_of_stars(const bst_camera *camera, bst_quat q_cam_from_gcr
 enum { BST_RUN_CENTROID_FRAMES = 8 };
 typedef struct bst_run_centroid {
     double x_px, y_px, cov_px2[3];
+    double exposure_ticks;
 } bst_run_centroid;
 typedef struct bst_run_centroids {
     struct {

@@ -49,16 +49,27 @@ static void measured_directions(void **state) {
     bst_world_free(world);
 }
 
+/* acceleration of the track in the image, px/s^2, and length of exposures, ticks */
+static double bend_px;
+static int64_t exposure_ticks;
+
+static double column_of(int k) {
+    return 100.0 + k + 0.5 * bend_px * k * k;
+}
+
 /* Detections and tracks of frame `k`, one every second: track `id` in pixel 100 + k; its detection
  * is 4 frames old where late. */
 static void take_frame(bst_ctx *ctx, bst_run_arcs *arcs, int k, int64_t id, int status, bool known,
                        bst_run_arc_fn take, void *user) {
     bst_detections *found = test_calloc(1, sizeof *found + 2 * sizeof found->items[0]);
     bst_tracks *tracks = test_calloc(1, sizeof *tracks + sizeof tracks->items[0]);
-    *found = (bst_detections){.exposure_id = k, .count = 2};
+    *found = (bst_detections){.exposure_id = k,
+                              .start_tick = (int64_t)k * RATE - exposure_ticks / 2,
+                              .end_tick = (int64_t)k * RATE + exposure_ticks / 2,
+                              .count = 2};
     found->items[0] = (bst_detection){.x_px = 7, .y_px = 8, .cov_xx = 9, .cov_yy = 9};
     found->items[1] =
-        (bst_detection){.x_px = 100.0 + k, .y_px = 200, .cov_xx = 0.01, .cov_yy = 0.01};
+        (bst_detection){.x_px = column_of(k), .y_px = 200, .cov_xx = 0.01, .cov_yy = 0.01};
     bst_assert_ok(ctx, bst_run_arcs_detections(ctx, arcs, 0, found));
     *tracks = (bst_tracks){.exposure_id = known ? k : k - 9,
                            .tick = (int64_t)k * RATE,
@@ -72,7 +83,7 @@ static void take_frame(bst_ctx *ctx, bst_run_arcs *arcs, int k, int64_t id, int 
                                    .direction_gcrf = {0, 0, 1},
                                    .rate_gcrf_radps = {1e-6 * k, 0, 0},
                                    .hits = k,
-                                   .x_px = 100.0 + k,
+                                   .x_px = column_of(k),
                                    .y_px = 200};
     bst_assert_ok(ctx, bst_run_arcs_tracks(ctx, arcs, 0, tracks, take, user));
     test_free(found);
@@ -140,8 +151,8 @@ static void saved_centroids_are_there(void **state) {
     bst_archive_free(saved);
 }
 
-/* An arc has the track's last state, and directions from its first detection on, fewer in long
- * arcs; it is the same in a run that goes on from a saved state. */
+/* An arc has the track's last state, and directions from its first detections on, fewer in long
+ * arcs, which leave the first two out; it is the same in a run that goes on from a saved state. */
 static void arcs_of_tracks(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -164,13 +175,16 @@ static void arcs_of_tracks(void **state) {
     assert_true(a->id == 3 && a->hits == 41);
     bst_assert_close(a->state.observer.time_s, 41.0, 1e-12);
     bst_assert_close(a->state.rate_radps.x, 41e-6, 1e-15);
-    /* 41 directions: every fourth of them, from the first on */
-    assert_int_equal(a->count, 11);
+    /* 41 directions: every fourth of them, from the ninth on */
+    assert_int_equal(a->count, 9);
     const bst_camera *camera = bst_world_camera(world, 0, 0);
     double scale = bst_camera_scale_rad(camera);
+    bst_world_view *view;
+    bst_bodies bodies;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
     for (int i = 0; i < a->count; i++) {
         const bst_od_observation *z = &a->directions[i];
-        bst_assert_close(z->observer.time_s, 1.0 + 4.0 * i, 1e-12);
+        bst_assert_close(z->observer.time_s, 9.0 + 4.0 * i, 1e-12);
         /* 0.1 px, not the 3 px of the other detection; a quarter of the attitude's is shared */
         double variance = 2.0 * (0.01 * scale * scale + 1e-12);
         bst_assert_close(z->cov_11 + z->cov_22, variance, 0.01 * variance);
@@ -180,6 +194,10 @@ static void arcs_of_tracks(void **state) {
         }
         bst_assert_close(shared, 0.25 * 2e-12, 0.01 * 0.25 * 2e-12);
         bst_assert_close(z->shared_change, 0.0, 1e-9);
+        bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, z->observer.time_s, &bodies));
+        const double phase = acos(-bst_vec3_dot(bst_vec3_unit(bodies.sun_m), z->direction));
+        assert_true(phase > 0.5 && phase < 2.6); /* neither full nor new */
+        bst_assert_close(z->photocentre_factor, bst_custody_photocentre_factor(phase), 1e-6);
         if (i > 0) {
             bst_assert_close(bst_vec3_angle(a->directions[i - 1].direction, z->direction),
                              4.0 * scale, 0.01 * 4.0 * scale);
@@ -187,8 +205,41 @@ static void arcs_of_tracks(void **state) {
     }
     assert_int_equal(other.count, 1);
     assert_memory_equal(&other.arc, a, sizeof *a);
+    bst_world_view_free(view);
     bst_run_arcs_free(arcs);
     bst_run_arcs_free(later);
+    bst_world_free(world);
+}
+
+/* Directions are those of the middle of an exposure: the mean of a path that bends lies beside it
+ * by the acceleration times T^2 / 24. */
+static void directions_of_the_middle(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world_with("", "");
+    taken out[2] = {{0}, {0}};
+    bend_px = 0.02;
+    for (int n = 0; n < 2; n++) {
+        bst_run_arcs *arcs = arcs_of(world);
+        exposure_ticks = n * 8 * (RATE / 10); /* 0 and 0.8 s */
+        for (int k = 1; k <= 13; k++) {
+            take_frame(&ctx, arcs, k, k < 13 ? 3 : 0, BST_TRACK_CONFIRMED, true, keep, &out[n]);
+        }
+        bst_run_arcs_free(arcs);
+    }
+    assert_true(out[0].arc.count == 10 && out[1].arc.count == 10);
+    const double scale = bst_camera_scale_rad(bst_world_camera(world, 0, 0));
+    for (int i = 0; i < 10; i++) {
+        const bst_vec3 a = out[0].arc.directions[i].direction,
+                       b = out[1].arc.directions[i].direction;
+        const bst_vec3 ahead = bst_vec3_sub(out[0].arc.directions[i > 0 ? i : 1].direction,
+                                            out[0].arc.directions[i > 0 ? i - 1 : 0].direction);
+        const double back = bend_px * scale * 0.8 * 0.8 / 24.0;
+        bst_assert_close(-bst_vec3_dot(bst_vec3_sub(b, a), bst_vec3_unit(ahead)), back,
+                         0.01 * back);
+    }
+    bend_px = 0.0;
+    exposure_ticks = 0;
     bst_world_free(world);
 }
 
@@ -268,7 +319,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(measured_directions),      cmocka_unit_test(saved_centroids_are_there),
         cmocka_unit_test(saved_times_are_possible), cmocka_unit_test(arcs_of_tracks),
-        cmocka_unit_test(arcs_that_lack_something),
+        cmocka_unit_test(directions_of_the_middle), cmocka_unit_test(arcs_that_lack_something),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

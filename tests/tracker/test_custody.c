@@ -337,12 +337,14 @@ static double nees_of_neighbours(const bst_elements *set, double ahead_m, int *u
     bst_assert_ok(&ctx, bst_sgp4_create(&ctx, set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &object));
     bst_assert_ok(&ctx, bst_sgp4_create(&ctx, &behind, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &eye));
     for (int i = 0; i < DRAWS; i++) {
+        const double factor = i % 2 ? 1.8 : 1.0; /* of the photocentre by phase */
         double normals[BST_CUSTODY_STATE], draws[6];
         bst_custody_filter filter;
         bst_od_observation arc[COUNT];
         for (int k = 0; k < BST_CUSTODY_STATE; k++) {
             normals[k] = bst_rng_normal(key, (uint64_t)i, (uint64_t)k);
-            draws[k] = photocentre_m * bst_rng_normal(key, (uint64_t)i, (uint64_t)(100 + k));
+            draws[k] =
+                factor * photocentre_m * bst_rng_normal(key, (uint64_t)i, (uint64_t)(100 + k));
         }
         bst_custody_filter_init(&config, &orbit, normals, &filter);
         for (int k = 0; k < COUNT; k++) {
@@ -359,7 +361,8 @@ static double nees_of_neighbours(const bst_elements *set, double ahead_m, int *u
                                                        .position_m = from.position_m,
                                                        .velocity_mps = from.velocity_mps},
                                           .cov_11 = own * own,
-                                          .cov_22 = own * own};
+                                          .cov_22 = own * own,
+                                          .photocentre_factor = i % 2 ? factor : 0.0};
             bst_od_see(&at, &arc[k].observer, &sight);
             const bst_tangent axes = bst_tangent_at(sight.direction);
             arc[k].direction = bst_tangent_exp(
@@ -378,6 +381,30 @@ static double nees_of_neighbours(const bst_elements *set, double ahead_m, int *u
     bst_sgp4_free(object);
     bst_sgp4_free(eye);
     return sum / fmax(*updated, 1.0);
+}
+
+/* The photocentre of a Lambertian sphere against the sum of its light over points of it. */
+static void photocentre_of_a_sphere(void **state) {
+    (void)state;
+    enum { POINTS = 400 };
+    for (int degrees = 20; degrees <= 160; degrees += 20) {
+        const double phase = degrees * BST_DEG_RAD;
+        double light = 0.0, moment = 0.0;
+        for (int i = 0; i < POINTS; i++) {
+            for (int k = 0; k < POINTS; k++) {
+                const double up = asin(2.0 * (i + 0.5) / POINTS - 1.0); /* equal areas */
+                const double round = BST_PI * ((k + 0.5) / POINTS - 0.5);
+                const double x = cos(up) * sin(round), z = cos(up) * cos(round);
+                const double lit = fmax(x * sin(phase) + z * cos(phase), 0.0);
+                light += lit * z;
+                moment += lit * z * x;
+            }
+        }
+        bst_assert_close(bst_custody_photocentre_factor(phase),
+                         fmax(moment / light * sqrt(2.0), 0.2), 2e-3);
+    }
+    assert_true(bst_custody_photocentre_factor(0.0) == 0.2);
+    bst_assert_close(bst_custody_photocentre_factor(BST_PI), 9.0 * BST_PI / 32.0 * sqrt(2.0), 1e-3);
 }
 
 /* Beside the observer directions of 0.01 arcsec are good to millimetres: they show how the
@@ -513,6 +540,7 @@ int main(void) {
         cmocka_unit_test(directions_and_strong_drag),
         cmocka_unit_test(arcs_scale_their_errors),
         cmocka_unit_test(neighbours_of_the_observer),
+        cmocka_unit_test(photocentre_of_a_sphere),
         cmocka_unit_test(noise_spreads_places),
         cmocka_unit_test(photocentre_and_strangers),
         cmocka_unit_test(refuses_what_is_no_ellipse),

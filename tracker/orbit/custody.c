@@ -172,6 +172,18 @@ static bool residuals(const bst_custody_orbit *o, const double x[N], const measu
     return true;
 }
 
+double bst_custody_photocentre_factor(double phase_rad) {
+    /* 0/0 at pi, where it is 9 pi / 32 radii */
+    const double a = fmin(fmax(phase_rad, 0.0), BST_PI - 1e-3), s = sin(a), c = cos(a);
+    const double radii = 3.0 * BST_PI / 16.0 * s * (1.0 + c) / (s + (BST_PI - a) * c);
+    return fmax(radii * sqrt(0.5) / 0.5, 0.2);
+}
+
+/* Standard deviation of the photocentre in a direction, rad. */
+static double photocentre_rad(const bst_custody_orbit *o, double factor, double range_m) {
+    return (factor > 0.0 ? factor : 1.0) * o->photocentre_m / range_m;
+}
+
 /* Correlation of the photocentre's displacement at two directions of a pass. It turns with the line
  * of sight and grows with the phase angle, by about itself in a radian; as the object goes round,
  * both change by its rate at perigee at most beside the line of sight's own turn. */
@@ -188,7 +200,7 @@ static double photocentre_correlation(const bst_custody_orbit *o, const bst_od_o
 static void noise(const bst_custody_orbit *o, const measurement *z,
                   const double range_m[BST_CUSTODY_DIRECTIONS], double r[M][M]) {
     if (z->track) {
-        const double spread = o->photocentre_m / range_m[0];
+        const double spread = photocentre_rad(o, z->track->photocentre_factor, range_m[0]);
         for (int i = 0; i < 4; i++) {
             memcpy(r[i], z->track->covariance[i], sizeof z->track->covariance[i]);
         }
@@ -205,7 +217,8 @@ static void noise(const bst_custody_orbit *o, const measurement *z,
             const bst_od_observation *b = &z->directions[k];
             const bst_tangent other = bst_tangent_at(b->direction);
             const bst_vec3 eb[2] = {other.e1, other.e2};
-            const double spread2 = o->photocentre_m / range_m[i] * (o->photocentre_m / range_m[k]) *
+            const double spread2 = photocentre_rad(o, a->photocentre_factor, range_m[i]) *
+                                   photocentre_rad(o, b->photocentre_factor, range_m[k]) *
                                    photocentre_correlation(o, a, b);
             const double own[2][2] = {{a->cov_11, a->cov_12}, {a->cov_12, a->cov_22}};
             kept *= k > i ? exp(-b->shared_change) : 1.0;

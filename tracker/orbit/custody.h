@@ -46,8 +46,8 @@ typedef struct bst_custody_orbit {
     bst_elements elements;
     double epoch_offset_s; /* time 0 minus the epoch of the elements */
     double a_m;            /* semi-major axis */
-    /* standard deviation of the photocentre from the centre of mass along each axis, m. Of a
-     * Lambertian sphere the displacement is 0.59 radii (3 pi / 16) at a phase of 90 degrees */
+    /* standard deviation of the photocentre from the centre of mass along each axis, m, where
+     * bst_custody_photocentre_factor is 1 */
     double photocentre_m;
 } bst_custody_orbit;
 
@@ -66,7 +66,18 @@ typedef struct bst_custody_observation {
     bst_vec3 rate_radps;     /* perpendicular to it */
     double covariance[4][4]; /* d1, d2, r1, r2 in the tangent axes at the direction, as in bst_track
                               */
+    /* factor on the standard deviation of the photocentre; 0: the phase is not known, and it is 1
+     */
+    double photocentre_factor;
 } bst_custody_observation;
+
+/* Standard deviation of the photocentre of a Lambertian sphere along each axis at a phase angle,
+ * over half the sphere's radius. At least 0.2: satellites are no spheres.
+ *
+ * Notes:     the displacement towards the Sun is 3 pi / 16 sin a (1 + cos a) / (sin a + (pi - a)
+ *            cos a) radii; its square is shared by two axes, as the shape is not known
+ * Reference: the integral of a Lambertian sphere's radiance over what is lit and seen */
+double bst_custody_photocentre_factor(double phase_rad);
 
 /* An observation as a filter predicts it. */
 typedef struct bst_custody_prediction {

@@ -16,6 +16,7 @@ typedef struct bst_od_observation {
      * observation is exp(-shared_change); 0: the same for the whole arc. It is not fitted, but
      * increases the covariance. */
     double shared_rad[2][2], shared_change;
+    double photocentre_factor; /* bst_custody_photocentre_factor; the fit does not use it */
 } bst_od_observation;
 
 typedef struct bst_od_options {
