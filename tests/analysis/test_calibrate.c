@@ -56,6 +56,9 @@ static void known_factors_are_found(void **state) {
     bst_ctx ctx = {0};
     bst_crlb_table bound;
     bst_crlb_table_init(&bound, SIGMA);
+    /* images of SIGMA, of which a part is jitter: in quadrature, 0.6 and 0.8 of it */
+    bst_camera sharp = camera;
+    sharp.psf_fwhm_px *= 0.8;
     bst_obsgen_calibration made, found;
     bst_obsgen_calibration_theory(&made);
     made.gain[0] = 0.95;
@@ -70,15 +73,17 @@ static void known_factors_are_found(void **state) {
     }
     const bst_generator_settings settings = {.capacity = 2048,
                                              .false_alarms_per_frame = 8.0,
+                                             .jitter_px = 0.6 * SIGMA,
                                              .streak_min_px = 1.5,
                                              .streak_max_px = 64.0};
     bst_generator *generator;
     bst_assert_ok(&ctx,
-                  bst_generator_create(&ctx, &camera, &camera, &settings, &made,
+                  bst_generator_create(&ctx, &sharp, &sharp, &settings, &made,
                                        bst_rng_make_key(3, 0, "x", "observations"), &generator));
     bst_calibration_fitter *calibrator;
     bst_assert_ok(&ctx, bst_calibration_fitter_create(&ctx, &calibrator));
-    const bst_calibration_path path = {.camera = &camera,
+    const bst_calibration_path path = {.camera = &sharp,
+                                       .jitter_px = 0.6 * SIGMA,
                                        .false_alarms_per_frame = 8.0,
                                        .streak_min_px = 1.5,
                                        .streak_max_px = 64.0};

@@ -17,6 +17,49 @@ typedef struct fixture {
     bst_scene_source_path paths[ROOM];
 } fixture;
 
+/* A sky that grows across the frame, unlike in x and y, without stars. */
+static double sky_at(double x_px, double y_px) {
+    return 40.0 + 0.3 * x_px + 0.05 * y_px;
+}
+
+double __wrap_bst_pd_sky_e(const bst_pd_sky *sky, double x_px, double y_px);
+double __wrap_bst_pd_sky_e(const bst_pd_sky *sky, double x_px, double y_px) {
+    assert_non_null(sky);
+    return sky_at(x_px, y_px);
+}
+
+bst_quat __wrap_bst_pd_sky_attitude(const bst_pd_sky *sky, double roll_rad);
+bst_quat __wrap_bst_pd_sky_attitude(const bst_pd_sky *sky, double roll_rad) {
+    (void)sky, (void)roll_rad;
+    return BST_QUAT_IDENTITY;
+}
+
+bst_status __wrap_bst_pd_sky_look(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
+                                  const bst_scene_source **stars, int *count);
+bst_status __wrap_bst_pd_sky_look(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
+                                  const bst_scene_source **stars, int *count) {
+    static const bst_scene_source none;
+    (void)ctx, (void)sky, (void)track;
+    *stars = &none;
+    *count = 0;
+    return BST_OK;
+}
+
+bst_status __wrap_bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
+                                   const bst_scene_source *sources, int count, bst_pd_stars *out);
+bst_status __wrap_bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *track,
+                                   const bst_scene_source *sources, int count, bst_pd_stars *out) {
+    (void)ctx, (void)sky, (void)track, (void)sources, (void)count, (void)out;
+    return BST_OK;
+}
+
+static const struct bst_skylight_map *map_of_the_sky;
+const struct bst_skylight_map *__wrap_bst_pd_sky_map(const bst_pd_sky *sky);
+const struct bst_skylight_map *__wrap_bst_pd_sky_map(const bst_pd_sky *sky) {
+    (void)sky;
+    return map_of_the_sky;
+}
+
 static fixture *make(const bst_pd_options *options) {
     fixture *f = calloc(1, sizeof *f);
     assert_non_null(f);
@@ -252,11 +295,37 @@ static void streaks_by_snr(void **state) {
     free(f);
 }
 
+/* Of a sky that differs from place to place each target has the noise of its own; where a map gives
+ * the frame's sky, the request has the dark current alone. */
+static void targets_before_an_uneven_sky(void **state) {
+    (void)state;
+    for (int mapped = 0; mapped < 2; mapped++) {
+        fixture *f = make(&(bst_pd_options){.trials = 1000});
+        f->scene.sky = (bst_pd_sky *)(void *)f; /* only handed on */
+        map_of_the_sky = mapped ? (const struct bst_skylight_map *)(const void *)f : NULL;
+        set(f, 1);
+        assert_int_equal(f->frame.count, ROOM);
+        for (int i = 0; i < ROOM; i++) {
+            double px = f->places[i].x_px, py = f->places[i].y_px;
+            double noise_e = sqrt(sky_at(px, py) + 4.0 + 36.0);
+            double flux = f->scene.snr[f->targets[i].point] * noise_e /
+                          sqrt(squares(px, py, 0, 0, f->scene.sigma_px));
+            bst_assert_close(f->targets[i].noise_e, noise_e, 1e-9);
+            bst_assert_close(f->targets[i].flux_e / flux, 1.0, 1e-6);
+        }
+        bst_assert_close(f->frame.request.background_e, mapped ? 4.0 : sky_at(0.0, 0.0) + 4.0,
+                         1e-9);
+        assert_ptr_equal(f->frame.request.background, map_of_the_sky);
+        free(f);
+    }
+    map_of_the_sky = NULL;
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(targets_at_rest),    cmocka_unit_test(targets_in_motion),
         cmocka_unit_test(targets_of_a_stack), cmocka_unit_test(targets_behind_a_vignetting_lens),
-        cmocka_unit_test(streaks_by_snr),
+        cmocka_unit_test(streaks_by_snr),     cmocka_unit_test(targets_before_an_uneven_sky),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -128,9 +128,19 @@ static void test_inconsistent(void **state) {
     refuse(f, f->bytes, "is damaged (sky cell 500)");
     f->data[cell] ^= 1;
     refuse_nan(f, offsetof(bst_star_header, complete_to_v_mag), true, "numbers in the header");
-    refuse_nan(f, sizeof h + 2 * sizeof(bst_star_patch) + offsetof(bst_star_patch, radius_deg),
-               true, "patch 2");
-    refuse_nan(f, cell - offsetof(bst_star_cell, first), false, "sky cell 500");
+    static const size_t places[] = {
+        offsetof(bst_star_cell, centre[0]), offsetof(bst_star_cell, centre[1]),
+        offsetof(bst_star_cell, centre[2]), offsetof(bst_star_cell, radius_rad),
+        offsetof(bst_star_cell, pm_max_radpyr)};
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+        refuse_nan(f, cell - offsetof(bst_star_cell, first) + places[i], false, "sky cell 500");
+    }
+    static const size_t of_patch[] = {offsetof(bst_star_patch, ra_deg),
+                                      offsetof(bst_star_patch, dec_deg),
+                                      offsetof(bst_star_patch, radius_deg)};
+    for (size_t i = 0; i < sizeof of_patch / sizeof *of_patch; i++) {
+        refuse_nan(f, sizeof h + 2 * sizeof(bst_star_patch) + of_patch[i], true, "patch 2");
+    }
     memcpy(f->data, &original, sizeof original);
 }
 

@@ -355,10 +355,17 @@ static void what_needs_a_region_is_refused_without(void **state) {
     rig_close(&r);
     config = defaults();
     config.strategy = BST_CONTROL_FIXED;
-    config.fixed_direction[2] = 0.0;
+    config.fixed_direction[0] = config.fixed_direction[1] = config.fixed_direction[2] = 0.0;
     assert_int_equal(rig_try(&r, &config, &none), BST_ERR_CONFIG);
     assert_non_null(strstr(r.ctx.message, "fixed_direction"));
     rig_close(&r);
+    for (int k = 0; k < 6; k++) { /* either way along one axis alone is a direction */
+        double part[3] = {0.0, 0.0, 0.0};
+        part[k / 2] = k % 2 ? 1e-3 : -1.0;
+        memcpy(config.fixed_direction, part, sizeof part);
+        bst_assert_ok(&r.ctx, rig_try(&r, &config, &none));
+        rig_close(&r);
+    }
 }
 
 /* Nothing is commanded while the attitude is unknown; the first one from stars begins the slew, at

@@ -123,10 +123,45 @@ static void a_target_is_due_by_its_uncertainty(void **state) {
     tear_down(&f);
 }
 
+/* A place that drifts fast counts at the time of its last sighting: what the track says of it then
+ * is 400 m and the track's own 38 m across the motion beside what was known at that time. */
+static void a_sighting_counts_at_its_time(void **state) {
+    (void)state;
+    fixture f;
+    start(&f, "{\"targets\": [{" TARGET_ ", \"sigma_m\": 500}], " REST_
+              "\"catalogue_drift_m_per_day\": 1200}");
+    const double drift_mps = 100.0, seen_s = 16.0;
+    f.tasking.along[GX5] =
+        (bst_tasking_along){.aa = 510.0 * 510.0, .dd = pow(86400.0 * drift_mps, 2)};
+    assert_true(plan(&f, 0, 0));
+    assert_int_equal(f.tasking.sensors[0].task.object, GX5);
+    bst_tracks *tracks = test_calloc(1, sizeof *tracks + sizeof tracks->items[0]);
+    tracks->count = 1;
+    tracks->items[0] = (bst_track){.status = BST_TRACK_CONFIRMED,
+                                   .target_of_interest = true,
+                                   .direction_gcrf = f.tasking.sensors[0].direction};
+    tracks->items[0].covariance[0][0] = tracks->items[0].covariance[1][1] = 1e-12;
+    f.tasking.sensors[0].arrival_s = 0.5 * seen_s; /* not the time that counts */
+    for (int64_t k = 0; k < 3; k++) {
+        tracks->tick = (int64_t)(10.0 * seen_s) - 20 * (2 - k);
+        bst_tasking_tracks(&f.tasking, 0, tracks);
+    }
+    test_free(tracks);
+    assert_true(plan(&f, 0, 161));
+    assert_int_equal(f.tasking.sensors[0].task.object, -1);
+    const double known = 510.0 * 510.0 + pow(drift_mps * seen_s, 2);
+    const double said = 400.0 * 400.0 + 38.0 * 38.0;
+    bst_assert_close(
+        pow(bst_tasking_sigma_m(&f.tasking, GX5, seen_s), 2) * (1.0 / known + 1.0 / said), 1.0,
+        0.01); /* the track's 38 m, which the angle to the motion makes more */
+    tear_down(&f);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(it_grows_as_the_catalogue_ages),
                                        cmocka_unit_test(tracks_count_as_in_a_fit),
                                        cmocka_unit_test(directions_tell_what_lies_across_them),
-                                       cmocka_unit_test(a_target_is_due_by_its_uncertainty)};
+                                       cmocka_unit_test(a_target_is_due_by_its_uncertainty),
+                                       cmocka_unit_test(a_sighting_counts_at_its_time)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

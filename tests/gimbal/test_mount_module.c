@@ -161,10 +161,11 @@ static void it_points_by_what_it_believes(void **state) {
     (void)state;
     for (int type = 0; type < 2; type++) {
         fixture f;
-        open_simulation(&f, types[type],
-                        "\"platform\": {\"telemetry_rate_hz\": 50, \"nav_rate_hz\": 4, "
-                        "\"attitude_bias_arcsec\": [40, -30, 20], \"drift_arcsec_per_s\": [3, 5, "
-                        "-4]}");
+        open_simulation(
+            &f, types[type],
+            "\"platform\": {\"telemetry_rate_hz\": 50, \"nav_rate_hz\": 4, "
+            "\"attitude_bias_arcsec\": [40, -30, 20], \"drift_arcsec_per_s\": [1800, 3000, "
+            "-2400]}");
         const double outer = 25.0 * BST_DEG_RAD, inner = -40.0 * BST_DEG_RAD;
         const double rate = 0.2 * BST_DEG_RAD, seconds = 20.0;
         bst_vec3 d = pointed(type, outer, inner);
@@ -204,8 +205,8 @@ static void it_points_by_what_it_believes(void **state) {
         bst_assert_close(off.x / BST_ARCSEC_RAD, -40.0, 1e-6);
         bst_assert_close(off.y / BST_ARCSEC_RAD, 30.0, 1e-6);
         bst_assert_close(off.z / BST_ARCSEC_RAD, -20.0, 1e-6);
-        /* the true one drifts instead; the last sight is of 19.999 s */
-        const bst_vec3 drift = {3.0, 5.0, -4.0};
+        /* the true one drifts instead, by 4 arcsec a step; the last sight is of 19.999 s */
+        const bst_vec3 drift = {1800.0, 3000.0, -2400.0};
         bst_quat body = bst_quat_mul(
             bst_quat_from_rotvec(bst_vec3_scale(drift, -19.999 * BST_ARCSEC_RAD)), f.nominal);
         bst_vec3 by_mount = pointed(type, f.axis_rad[0] + 0.019 * rate, f.axis_rad[1]);

@@ -78,6 +78,27 @@ static void dim_panels(void **state) {
     bst_assert_close(s.length_px, hypot(28.0, 10.0), 2.0);
 }
 
+/* Four bars about a dark middle: that belongs to the target too, so that its place is the middle of
+ * all also where one bar is wider. */
+static void a_hole_is_part_of_the_outline(void **state) {
+    (void)state;
+    const double x = 57.0, y = 38.0, half_x = 20.0, half_y = 14.0;
+    for (int wide = 0; wide < 2; wide++) { /* the left bar, 4 or 12 px */
+        const double left = wide ? 6.0 : 2.0;
+        const rectangle scene[] = {{x - half_x + left, y, left, half_y, 2e4},
+                                   {x + half_x - 2.0, y, 2.0, half_y, 2e4},
+                                   {x, y - half_y + 2.0, half_x, 2.0, 2e4},
+                                   {x, y + half_y - 2.0, half_x, 2.0, 2e4}};
+        bst_silhouette s = find(scene, 4);
+        bst_assert_close(s.centre_x_px, x, 0.3); /* of the whole outline, to a part of a pixel */
+        bst_assert_close(s.centre_y_px, y, 0.3);
+        bst_assert_close(s.x_px, x, 0.5); /* of its pixels, which are whole */
+        bst_assert_close(s.y_px, y, 0.5);
+        bst_assert_close(s.area_px2, 4.0 * half_x * half_y, 4.0 * (half_x + half_y));
+        bst_assert_close(s.length_px, 2.0 * hypot(half_x, half_y), 4.0);
+    }
+}
+
 /* Standard deviation of the centre of a target of `length_px`; 0: the frame has none. */
 static double centre_sigma_px(bst_extended_step *step, double length_px) {
     enum { ITEMS = 4 };
@@ -118,6 +139,7 @@ static void size_of_earlier_frames(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(dim_panels),
+                                       cmocka_unit_test(a_hole_is_part_of_the_outline),
                                        cmocka_unit_test(size_of_earlier_frames)};
     return cmocka_run_group_tests_name("imgproc/silhouette", tests, NULL, NULL);
 }

@@ -271,6 +271,55 @@ static void test_messages(void **state) {
     end(&f);
 }
 
+/* Each number of a map at its limits, and beyond them. */
+static void test_limits(void **state) {
+    (void)state;
+#define AT(member) offsetof(bst_keyword_map, member)
+    static const struct {
+        size_t at;
+        const char *key;
+        double least, most;
+    } limits[] = {
+        {AT(exposure_s), "exposure_s", 0.0, 86400.0},
+        {AT(gain_e_per_dn), "gain_e_per_dn", 1e-3, 1e4},
+        {AT(read_noise_e), "read_noise_e", 0.0, 1e4},
+        {AT(offset_dn), "offset_dn", -1e6, 1e6},
+        {AT(full_well_e), "full_well_e", 1.0, 1e9},
+        {AT(pixel_scale_arcsec), "pixel_scale_arcsec", 0.01, 600.0},
+        {AT(exposure_id), "exposure_id", -1.0, 9e15},
+        {AT(plane_period_s), "plane_period_s", 0.0, 1e6},
+        {AT(observer_position_gcrf_m.x), "observer_position_gcrf_m", -1e13, 1e13},
+        {AT(observer_position_gcrf_m.y), "observer_position_gcrf_m", -1e13, 1e13},
+        {AT(observer_position_gcrf_m.z), "observer_position_gcrf_m", -1e13, 1e13},
+        {AT(observer_velocity_gcrf_mps.x), "observer_velocity_gcrf_mps", -1e6, 1e6},
+        {AT(observer_velocity_gcrf_mps.y), "observer_velocity_gcrf_mps", -1e6, 1e6},
+        {AT(observer_velocity_gcrf_mps.z), "observer_velocity_gcrf_mps", -1e6, 1e6},
+    };
+#undef AT
+    fixture f = begin("limits.fits");
+    bst_keyword_map sound;
+    load_map(&f, map_text, &sound);
+    mapped_file(&f, "2.5", "2024-08-26T17:45:45.582", "[2:3,1:2]");
+    const bst_keyword_number one = {.factor = 1.0, .value = 1.0};
+    sound.observer_position_gcrf_m = (bst_keyword_vector){one, one, one};
+    sound.observer_velocity_gcrf_mps = (bst_keyword_vector){one, one, one};
+    for (size_t i = 0; i < sizeof limits / sizeof *limits; i++) {
+        const double least = limits[i].least, most = limits[i].most;
+        const double values[4] = {least > 0.0 ? 0.5 * least : 2.0 * fmin(least, -0.5), least, most,
+                                  2.0 * most};
+        for (int k = 0; k < 4; k++) {
+            bst_keyword_map map = sound;
+            bst_keyword_number *number =
+                (bst_keyword_number *)(void *)((char *)&map + limits[i].at);
+            *number = (bst_keyword_number){.factor = 1.0, .value = values[k]};
+            bool good = k == 1 || k == 2;
+            assert_int_equal(try_file(&f, &map), good ? BST_OK : BST_ERR_FORMAT);
+            assert_true(good || strstr(f.ctx.message, limits[i].key));
+        }
+    }
+    end(&f);
+}
+
 /* A file that is cut anywhere is refused or read, with a message that names it. */
 static void test_truncated(void **state) {
     (void)state;
@@ -420,8 +469,9 @@ int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pixels),     cmocka_unit_test(test_keywords_and_sections),
         cmocka_unit_test(test_cube_table), cmocka_unit_test(test_messages),
-        cmocka_unit_test(test_truncated),  cmocka_unit_test(test_mutations),
-        cmocka_unit_test(test_files),      cmocka_unit_test(test_rate_trend),
+        cmocka_unit_test(test_limits),     cmocka_unit_test(test_truncated),
+        cmocka_unit_test(test_mutations),  cmocka_unit_test(test_files),
+        cmocka_unit_test(test_rate_trend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -102,6 +102,39 @@ static void thresholds_have_their_limits(void **state) {
                 bst_matched_threshold(1.0, 0.0, 1.0, pixels, NULL));
 }
 
+/* P(next > u | this > u) of two normal variables, summed in small steps. */
+static double stays(double u, double rho) {
+    const double step = 1e-3, root = sqrt(1.0 - rho * rho);
+    double sum = 0.0, total = 0.0;
+    for (double z = u + 0.5 * step; z < u + 6.0; z += step) {
+        double weight = exp(-0.5 * (z * z - u * u));
+        sum += weight * bst_matched_normal_below((rho * z - u) / root);
+        total += weight;
+    }
+    return sum / total;
+}
+
+/* Maxima of the two filters are in the ratio of the roughness of their fields, by differences of
+ * the autocorrelation, less those that a maximum of the other filter already is. */
+static void streak_filters_share_the_false_alarms(void **state) {
+    (void)state;
+    static const double lengths[] = {0.03, 0.5, 3.0, 12.0, 90.0};
+    const double sigma = 1.1, pixels = 1e6, h = 0.02;
+    for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
+        const double length = lengths[i];
+        double share, u = bst_matched_threshold(sigma, length, 1.0, pixels, &share);
+        double along = 2.0 * (1.0 - bst_matched_falloff(h, 0.0, length, sigma)) / (h * h);
+        double across = 2.0 * (1.0 - bst_matched_falloff(0.0, h, length, sigma)) / (h * h);
+        double rho = bst_matched_efficiency((bst_obsgen_path_px){length, 0.0},
+                                            (bst_obsgen_path_px){0.0, 0.0}, sigma);
+        double point = 1.0 / (2.0 * sigma * sigma), fresh = 1.0 - stays(u, fmin(rho, 0.999999));
+        double both = point + sqrt(along * across) * fresh;
+        bst_assert_close(share, 1.0 - point / both, 0.01); /* the tail by 48 nodes */
+        double rate = pixels * both * u * exp(-0.5 * u * u) / pow(2.0 * BST_PI, 1.5);
+        bst_assert_close(rate, 1.0, 0.01);
+    }
+}
+
 /* One or the other of two normal variables: closed forms for independent ones, for equal ones, and
  * for thresholds of zero (orthant probability). */
 static void either_of_two_exceeds(void **state) {
@@ -127,6 +160,7 @@ int main(void) {
         cmocka_unit_test(efficiency_is_one_for_its_own_filter_and_less_else),
         cmocka_unit_test(falloff_is_the_autocorrelation),
         cmocka_unit_test(thresholds_have_their_limits),
+        cmocka_unit_test(streak_filters_share_the_false_alarms),
         cmocka_unit_test(either_of_two_exceeds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

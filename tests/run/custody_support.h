@@ -89,6 +89,9 @@ static inline bst_vec3 beside(bst_vec3 direction, double off_rad) {
     return bst_tangent_exp(direction, bst_tangent_vector(&axes, off_rad, 0.0));
 }
 
+/* The sensor of tracks. */
+static int from_sensor;
+
 /* Tracks of a frame: of `object` with `hits` detections, none in the last `misses` frames,
  * `off_rad` beside it; object below 0: none. */
 static inline void take_track(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int object,
@@ -108,7 +111,7 @@ static inline void take_track(bst_ctx *ctx, bst_run_custody *c, const bst_world 
         tracks->items[0] = track_at(id, d, bst_tangent_project(d, moved), hits);
         tracks->items[0].misses_in_row = misses;
     }
-    bst_assert_ok(ctx, bst_run_custody_tracks(ctx, c, 0, tracks));
+    bst_assert_ok(ctx, bst_run_custody_tracks(ctx, c, from_sensor, tracks));
     test_free(tracks);
 }
 

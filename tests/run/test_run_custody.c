@@ -218,7 +218,8 @@ static void a_failed_update_is_counted(void **state) {
     bst_world_free(world);
 }
 
-/* GX5, called A, of 12 m^2, and C, with a mean anomaly of its own. */
+/* GX5, called A, of 12 m^2, and C, with a mean anomaly of its own; the observer has two sensors,
+ * the second one with images of twice the width. */
 static bst_world *world_with_neighbour(const scratch *place, const char *anomaly) {
     char text[256], objects[2048], line[70];
     snprintf(line, sizeof line, "2 44802   0.0366 343.6423 0001933 100.2390 %s  1.00270919  944",
@@ -239,7 +240,9 @@ static bst_world *world_with_neighbour(const scratch *place, const char *anomaly
              "{\"name\": \"A\", \"area_m2\": 12, " TEST_GX5
              "}, {\"name\": \"C\", \"orbit\": {\"elements_file\": \"%s\", \"norad\": 44802}}",
              scratch_path(&at, "near.tle"));
-    return test_world_with(objects, "");
+    return test_world_with(objects,
+                           ", \"name\": \"one\"}, {\"name\": \"two\", \"camera\": "
+                           "{\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15, \"psf_fwhm_px\": 5}");
 }
 
 /* What becomes of one track of A. */
@@ -281,10 +284,12 @@ static void neighbours_by_their_uncertainty(void **state) {
     scratch place;
     scratch_make(&place);
     bst_world *world = world_with_neighbour(&place, "191.6451");
-    const bst_camera *camera = bst_world_camera(world, 0, 0);
-    const double fwhm = camera->psf_fwhm_px * camera->pixel_scale_arcsec * BST_ARCSEC_RAD;
     const double sigmas[3][2] = {{0.1, 0.3}, {0.3, 0.1}, {0.2, 0.6}};
-    for (int k = 0; k < 6; k++) {
+    for (int n = 0; n < 12; n++) {
+        const int k = n / 2;
+        from_sensor = n % 2;
+        const bst_camera *camera = bst_world_camera(world, 0, from_sensor);
+        const double fwhm = camera->psf_fwhm_px * camera->pixel_scale_arcsec * BST_ARCSEC_RAD;
         const double *s = sigmas[k / 2], limit = 1.0 + fmin(2.0 * hypot(s[0], s[1]), 1.0);
         const double d = fwhm * limit * (k % 2 ? 1.01 : 0.99);
         bst_custody_prediction p = {.innovation = {0.6 * d, -0.8 * d}, .chi2 = 1e3};
@@ -299,6 +304,7 @@ static void neighbours_by_their_uncertainty(void **state) {
         /* half of the radius of a disc of this area */
         bst_assert_close(photocentres_m[0], 0.5 * sqrt(12.0 / BST_PI), 1e-12);
     }
+    from_sensor = 0;
     bst_world_free(world);
     scratch_remove(&place);
 }

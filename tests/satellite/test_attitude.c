@@ -163,6 +163,33 @@ static bst_vec3 seen_after(bst_quat q, bst_vec3 axis, double angle, bst_vec3 sta
 
 static const bst_vec3 star = {0.36, -0.48, 0.8};
 
+/* About a principal axis, and any axis of a body of equal moments, it turns evenly, also before
+ * time 0; a rate that is off by 1e-6 makes no more difference than that. */
+static void spins_are_even(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    static const double equal[3] = {80, 80, 80};
+    static const struct {
+        bst_vec3 axis;
+        const double *inertia;
+    } cases[] = {{{1, 0, 0}, inertia},  {{0, 0, 1}, inertia},        {{0, 0, -1}, inertia},
+                 {{-1, 0, 0}, inertia}, {{0.6, 0.48, -0.64}, equal}, {{0, -1, 0}, equal}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        for (int off = 0; off < 2; off++) {
+            bst_tumbling *t;
+            bst_vec3 w = bst_vec3_scale(cases[k].axis, 0.2);
+            w.y += off ? 2e-7 : 0.0;
+            bst_assert_ok(&ctx, bst_tumbling_create(&ctx, cases[k].inertia, w, &t));
+            for (double s = -40.0; s < 60.0; s += 7.0) {
+                bst_vec3 got = bst_quat_rotate(bst_tumbling_at(t, s, NULL), star);
+                bst_vec3 want = seen_after(BST_QUAT_IDENTITY, cases[k].axis, 0.2 * s, star);
+                bst_assert_close(bst_vec3_angle(got, want), 0.0, off ? 2e-5 : 1e-7);
+            }
+            bst_tumbling_free(t);
+        }
+    }
+}
+
 /* Rows at uneven times, one of them with the other sign: turned evenly between them, held outside;
  * the fastest within a minute. */
 static void rows_are_followed_at_even_rates(void **state) {
@@ -189,6 +216,44 @@ static void rows_are_followed_at_even_rates(void **state) {
                                {30.0, 0.08},  {114.0, 0.08}, {116.0, 0.1 / 445.0}, {561.0, 0.0}};
     for (size_t k = 0; k < sizeof rates / sizeof *rates; k++) {
         bst_assert_close(bst_attitude_table_rate_radps(rows, 5, rates[k][0]), rates[k][1], 1e-7);
+    }
+}
+
+/* Rows that a table may not have, each with one beside it that it may. */
+static void rows_ascend_and_are_unit_quaternions(void **state) {
+    (void)state;
+    static const struct {
+        const char *row;
+        bool good;
+    } cases[] = {{"12.5, 0.6, 0, 0, 0.8", true},    {"12, 0.6, 0, 0, 0.8", false},
+                 {"11.9, 0.6, 0, 0, 0.8", false},   {"12.5, 0, 0.6, 0.8, 0", true},
+                 {"12.5, 0.6, 0, 0, 0.8009", true}, {"12.5, 0.6, 0, 0, 0.8013", false},
+                 {"12.5, 0.6, 0, 0, 0.7991", true}, {"12.5, 0.6, 0, 0, 0.7987", false},
+                 {"1e9, 0.6, 0, 0, 0.8", true},     {"1.01e9, 0.6, 0, 0, 0.8", false},
+                 {"12.5, 0.6, 0, 0", false},        {"12.5, 0.6, 0, 0, 0.8, 1", false},
+                 {"12.5, 0.6, nan, 0, 0.8", false}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char path[BST_TEST_PATH];
+        bst_test_template(path, "attitude");
+        int handle = mkstemp(path);
+        assert_true(handle >= 0);
+        FILE *file = fdopen(handle, "w");
+        assert_non_null(file);
+        fprintf(file, "time_s, qx, qy, qz, qw\n12, 0, 0, 1, 0\n%s\n", cases[k].row);
+        assert_int_equal(fclose(file), 0);
+        bst_ctx ctx = {0};
+        bst_attitude_row *rows;
+        int count;
+        bst_status status = bst_attitude_table_load(&ctx, &from, path, "", &rows, &count);
+        (void)remove(path);
+        assert_int_equal(status, cases[k].good ? BST_OK : BST_ERR_CONFIG);
+        if (cases[k].good) {
+            assert_int_equal(count, 2);
+            assert_true(rows[1].seconds == strtod(cases[k].row, NULL));
+            free(rows);
+        } else {
+            assert_non_null(strstr(ctx.message, "line 3"));
+        }
     }
 }
 
@@ -264,7 +329,9 @@ int main(void) {
         cmocka_unit_test(laws_point_their_axes),
         cmocka_unit_test(a_phase_continues_the_one_before),
         cmocka_unit_test(wrong_attitudes_are_refused),
+        cmocka_unit_test(spins_are_even),
         cmocka_unit_test(rows_are_followed_at_even_rates),
+        cmocka_unit_test(rows_ascend_and_are_unit_quaternions),
         cmocka_unit_test(commands_hold_until_the_next),
         cmocka_unit_test(rates_of_the_laws),
     };

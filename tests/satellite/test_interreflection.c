@@ -109,6 +109,33 @@ static void light_goes_round_the_corner(void **state) {
     bst_test_model_close(&m);
 }
 
+/* Of a blue wall and a red floor: each colour once for each reflection, whichever comes first. */
+static void both_colours_are_in_the_light(void **state) {
+    (void)state;
+    static const double blue[BST_SUNLIGHT_COLOURS] = {1.5, 1.0, 0.6, 0.25},
+                        red[BST_SUNLIGHT_COLOURS] = {0.3, 1.0, 1.4, 2.0};
+    bst_ctx ctx = {0};
+    bst_test_model m = bst_test_model_open(
+        "{\"materials\": [{\"name\": \"a\", \"diffuse\": 0.3, \"colour\": [0.3, 1, 1.4, 2]}, "
+        "{\"name\": \"b\", \"diffuse\": 0.4, \"colour\": [1.5, 1, 0.6, 0.25]}], \"parts\": "
+        "[" CORNER "]}");
+    bst_interreflection *r;
+    bst_assert_ok(&ctx, bst_interreflection_create(&ctx, m.satellite, &r));
+    for (int k = 0; k < 2; k++) { /* the wall is lit, then the floor */
+        const bst_vec3 up = {0, 0, 1}, ahead = {0, 1, 0};
+        const bst_satellite_light light = {
+            .sun = k ? up : ahead, .observer = k ? ahead : up, .sunlit = 1};
+        bst_satellite_flux flux = {.error = 0};
+        bst_interreflection_add(r, m.pose, &light, &flux);
+        for (int c = 0; c < BST_SUNLIGHT_COLOURS; c++) {
+            double want = 0.3 / BST_PI * 0.4 * 0.200044 * blue[c] * red[c];
+            bst_assert_close(flux.sun[c], want, 5e-3 * want); /* the form factor by points */
+        }
+    }
+    bst_interreflection_free(r);
+    bst_test_model_close(&m);
+}
+
 static void large_meshes_are_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -127,6 +154,7 @@ int main(void) {
         cmocka_unit_test(form_factors_are_the_closed_forms),
         cmocka_unit_test(a_cavity_is_closed),
         cmocka_unit_test(light_goes_round_the_corner),
+        cmocka_unit_test(both_colours_are_in_the_light),
         cmocka_unit_test(large_meshes_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -247,6 +247,45 @@ static void auto_takes_the_cheaper_motion(void **state) {
     }
 }
 
+/* Whether stars of so much light share a track in a camera that rolls, with pixels read by so many.
+ */
+static bool shares_a_track(fixture *f, double electrons_per_s, double roll_rad, int binning) {
+    bst_camera camera = scene_camera(96, 96);
+    camera.pixel_scale_arcsec = 0.3;
+    const scene_motion motion = {.x_px = 3, .roll_rad = roll_rad, .duration_s = 1, .samples = 101};
+    scene_track track = scene_track_make(&camera, &motion);
+    bst_scene_source *stars = scene_stars(&camera, 8, electrons_per_s, 4.0, 9);
+    const bst_renderer_options options = bst_renderer_default_options();
+    const bst_render_request q = {.window = whole(&camera),
+                                  .track = &track.track,
+                                  .sources = stars,
+                                  .count = 8,
+                                  .binning = binning};
+    static float light[96 * 96];
+    bst_renderer *r;
+    bst_render_stats stats;
+    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, &options, &r));
+    bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, light));
+    bst_renderer_get_stats(r, &stats);
+    bst_renderer_free(r);
+    free(stars);
+    scene_track_free(&track);
+    return stats.single_kernel;
+}
+
+/* A pixel that is read holds the light of all that are binned: a star of a sixteenth of the light
+ * in pixels of 4 x 4 asks for the same as one in single pixels. */
+static void binned_light_counts_as_a_whole(void **state) {
+    fixture *f = *state;
+    int shared = 0, rolls = 0;
+    for (double roll = 1e-8; roll < 1e-4; roll *= 1.2, rolls++) {
+        bool one = shares_a_track(f, 1.6e4, roll, 1);
+        assert_int_equal(shares_a_track(f, 1e3, roll, 4), one);
+        shared += one;
+    }
+    assert_true(shared > 0 && shared < rolls);
+}
+
 /* One track for all is wrong by sigmas where the field turns, and says so. */
 static void one_track_is_wrong_where_the_field_turns(void **state) {
     fixture *f = *state;
@@ -400,6 +439,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(predicted_errors_hold),
         cmocka_unit_test(predicted_errors_of_crowds_hold),
         cmocka_unit_test(auto_takes_the_cheaper_motion),
+        cmocka_unit_test(binned_light_counts_as_a_whole),
         cmocka_unit_test(one_track_is_wrong_where_the_field_turns),
         cmocka_unit_test(equal_parts_converge),
         cmocka_unit_test(parts_of_a_pixel_converge),

@@ -352,6 +352,14 @@ static void queries_of_a_frame(void **state) {
     bst_assert_close(eye.earth_bary_mps.x, 3e4, 1e-9);
     bst_assert_close(eye.earth_bary_mps.y, -1e4, 1e-9);
     bst_assert_close(eye.earth_bary_mps.z, 5e3, 1e-9);
+    /* by a clock that is 1.5 s fast the frame is at 3 s: navigation knows the time, 1 s before */
+    static bst_clock clock;
+    clock.state[0] = 1.5;
+    t.clock = &clock;
+    assert_true(bst_tracker_frame_observer(&t, &nav, 4.5, &eye));
+    bst_assert_close(eye.position_m.x, r * cos(speed / r), 0.01);
+    bst_assert_close(eye.position_m.z, r * sin(speed / r), 0.01);
+    t.clock = NULL;
 }
 
 /* Two equal tracks are ambiguous; the rate decides later. A target that became certain keeps its

@@ -2,7 +2,8 @@
 #include "sim/optics/ghosts.h"
 #include "tests/world/field_scene.h"
 
-static const bst_window full = {0, 0, 1024, 1024};
+static const bst_window full = {0, 0, 1024, 1024}, wide = {0, 0, 800, 400}, high = {0, 0, 400, 800};
+enum { OUTSIDE_PX = 300 }; /* from which the second ghost of the scene takes light */
 
 static void query(scene *s, double sigma, bst_window window) {
     bst_field_options options = {.v_limit = 13, .margin_px = 5, .ghost_sigma = sigma};
@@ -19,18 +20,26 @@ static bst_truth_item item_of(const scene *s, int i) {
 }
 
 /* The scene of GX5 with an opposite ghost of 5 % and a bright one of half the distance. */
-static scene ghost_scene(void) {
-    scene s = make_scene_in(test_world(
-        "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
-        "]}, \"observers\": [{\"name\": \"neossat\", " TEST_NEOSSAT
-        ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": {\"pixel_scale_arcsec\": 3, "
-        "\"aperture_m\": 0.15, \"ghosts\": [{\"intensity\": 0.05, \"radius_px\": 3}, "
-        "{\"intensity\": 0.5, \"factor\": 0.5}]}}]}]}"));
+static scene ghost_scene_on(bst_window sensor) {
+    char text[2000];
+    snprintf(text, sizeof text,
+             "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+             "]}, \"observers\": [{\"name\": \"neossat\", " TEST_NEOSSAT
+             ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": "
+             "{\"pixel_scale_arcsec\": 3, \"width_px\": %d, \"height_px\": %d, \"aperture_m\": "
+             "0.15, \"ghosts\": [{\"intensity\": 0.05, \"radius_px\": 3}, {\"intensity\": 0.5, "
+             "\"factor\": 0.5, \"outside_px\": %d}]}}]}]}",
+             sensor.width, sensor.height, OUTSIDE_PX);
+    scene s = make_scene_in(test_world(text));
     for (int64_t tick = 0; tick <= 3000; tick += 100) {
         double u = (double)tick / 3000.0 - 0.5;
         push(s.history, tick, turned(s.target, 12.0 * u, -4.0 * u, 0.0));
     }
     return s;
+}
+
+static scene ghost_scene(void) {
+    return ghost_scene_on(full);
 }
 
 static void sources_have_ghosts_where_they_are_mapped(void **state) {
@@ -111,10 +120,56 @@ static void windows_see_ghosts_of_stars_elsewhere(void **state) {
     free_scene(&s);
 }
 
+/* On sensors of unequal sides: each star that is bright enough has a ghost by the second one where
+ * that lies on the sensor, also from so far outside as it takes light from. */
+static void stars_about_the_sensor_have_ghosts(void **state) {
+    (void)state;
+    const bst_window around = {0, 0, 2048, 2048};
+    scene all = ghost_scene_on(around);
+    query(&all, 0.05, around);
+    for (int tall = 0; tall < 2; tall++) {
+        const bst_window sensor = tall ? high : wide;
+        scene s = ghost_scene_on(sensor);
+        query(&s, 0.05, sensor);
+        const double sigma = sqrt(s.truth.background_e + s.truth.dark_e + 64.0);
+        int outside[4] = {0}; /* left, right, above, below */
+        for (int i = 0; i < all.count; i++) {
+            const bst_scene_source *source = &all.sources[i];
+            bst_truth_item item;
+            bst_field_truth_item(all.field, &all.track, source, around, 1, &all.truth, &item);
+            /* from the middle of both sensors */
+            double x = item.x_mid_px - 1023.5, y = item.y_mid_px - 1023.5;
+            bool near = fabs(x) < 0.5 * sensor.width + OUTSIDE_PX - 1.0 &&
+                        fabs(y) < 0.5 * sensor.height + OUTSIDE_PX - 1.0 &&
+                        fabs(x) < sensor.width - 1.0 && fabs(y) < sensor.height - 1.0;
+            /* half of its light, of which the brightest pixel of 12 px of motion has 1 % or more */
+            if (source->kind != BST_SOURCE_STAR || !near ||
+                0.5 * 0.01 * item.electrons < 0.05 * sigma) {
+                continue;
+            }
+            int ghosts = 0;
+            for (int k = 0; k < s.count; k++) {
+                const bst_scene_source *g = &s.sources[k];
+                ghosts += g->kind == BST_SOURCE_STAR_GHOST && g->id == source->id &&
+                          g->ghost->factor == 0.5;
+            }
+            assert_int_equal(ghosts, 1);
+            outside[0] += x < -0.5 * sensor.width;
+            outside[1] += x > 0.5 * sensor.width;
+            outside[2] += y < -0.5 * sensor.height;
+            outside[3] += y > 0.5 * sensor.height;
+        }
+        assert_true(outside[tall ? 2 : 0] >= 1 && outside[tall ? 3 : 1] >= 1);
+        free_scene(&s);
+    }
+    free_scene(&all);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sources_have_ghosts_where_they_are_mapped),
         cmocka_unit_test(windows_see_ghosts_of_stars_elsewhere),
+        cmocka_unit_test(stars_about_the_sensor_have_ghosts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -70,6 +70,42 @@ static void shadows_of_spheres(void **state) {
     bst_occultation_free(w);
 }
 
+/* Share of the Sun's light, its limb darkened by 0.6, that a disc of `radius` at a distance from
+ * the middle covers; in radii of the Sun's disc. */
+static double covered(double radius, double distance) {
+    enum { PARTS = 400 };
+    double in = 0.0, all = 0.0;
+    for (int i = 0; i < PARTS; i++) {
+        double r = (i + 0.5) / PARTS, light = r * (0.4 + 0.6 * sqrt(1.0 - r * r));
+        /* cosine of half the arc of this ring that is within the disc */
+        double c = (r * r + distance * distance - radius * radius) / (2.0 * r * distance);
+        in += light * acos(fmin(fmax(c, -1.0), 1.0)) / BST_PI;
+        all += light;
+    }
+    return in / all;
+}
+
+/* A small body beside the way to the Sun covers a part of it as long as the discs overlap, on each
+ * side. */
+static void shadows_off_the_middle(void **state) {
+    (void)state;
+    bst_occultation *w = work_memory(0);
+    const double sun = 1000 * BST_SUN_RADIUS_M / (far_sun.x - 7e6);
+    bst_occultation_body point = sphere_at(0, 0, 1e-3), front = sphere_at(1000, 0, 0.5 * sun);
+    for (int side = 0; side < 4; side++) {
+        for (double x = 0.1; x < 2.0; x += 0.2) {
+            double off = (side % 2 ? -x : x) * sun;
+            front.position_m.y = side < 2 ? off : 0.0;
+            front.position_m.z = side < 2 ? 0.0 : off;
+            double want = covered(0.5, x);
+            /* 48 points of the Sun: the light of five of them */
+            bst_assert_close(bst_occultation_of_sun(w, &point, &front, far_sun), want,
+                             x < 1.5 ? 0.1 : 0.0);
+        }
+    }
+    bst_occultation_free(w);
+}
+
 #define SQUARE(name, size, more)                                                               \
     "{\"name\": \"" name                                                                       \
     "\", \"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": "                  \
@@ -218,8 +254,11 @@ static void light_takes_time_between_bodies(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spheres_hide_by_their_discs),      cmocka_unit_test(shadows_of_spheres),
-        cmocka_unit_test(shapes_hide_by_their_silhouettes), cmocka_unit_test(light_is_taken_away),
+        cmocka_unit_test(spheres_hide_by_their_discs),
+        cmocka_unit_test(shadows_of_spheres),
+        cmocka_unit_test(shadows_off_the_middle),
+        cmocka_unit_test(shapes_hide_by_their_silhouettes),
+        cmocka_unit_test(light_is_taken_away),
         cmocka_unit_test(light_takes_time_between_bodies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
