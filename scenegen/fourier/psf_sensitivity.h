@@ -25,6 +25,9 @@ typedef struct bst_psf_sensitivity {
     double light[BST_NODE_DIRECTIONS][BST_LIGHT_STEPS];
     /* of the derivatives of order 2, 4 and 6 along each direction; the greatest of all */
     bst_flank_curve flank[BST_FLANKS][BST_NODE_DIRECTIONS][3], any_flank[BST_FLANKS];
+    /* of a path: of order 4 and 6 smoothed by at least n + 1 steps, and of a row of groups */
+    bst_flank_curve smooth_flank[BST_NODE_DIRECTIONS][BST_SMOOTH_STEPS - 1][2],
+        row_flank[BST_NODE_DIRECTIONS];
 } bst_psf_sensitivity;
 
 /* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their centre. */

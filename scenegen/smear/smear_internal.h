@@ -26,10 +26,11 @@ typedef struct bst_smear_level {
      * bst_smear_nodes_error, their bound and what is predicted, and of profiles */
     double error[BST_NODE_SCALES], predicted[BST_NODE_SCALES];
     double profile_error, predicted_profile;
-    /* part of the nodes' predicted error, at each motion scale and all larger ones, whose pattern
-     * in the image is not that of the curves */
-    double higher_part[BST_NODE_SCALES];
-    bst_flank_curve flank[BST_FLANKS]; /* with the PSF's sensitivity */
+    /* part of the nodes' predicted error, at each motion scale and all larger ones, that is not of
+     * missed highest moments, and parts of these by pattern; `directions` as of
+     * bst_smear_node_list */
+    double higher_part[BST_NODE_SCALES], missed_part[BST_NODE_SCALES][BST_PATTERNS];
+    unsigned directions;
     bool rests;                        /* as of bst_smear_node_list */
     bool alike;                        /* predicted errors are the bounds: all groups are short */
     double widening_px2;               /* largest mean widening of the nodes at one place */

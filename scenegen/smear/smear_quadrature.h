@@ -43,11 +43,11 @@ typedef struct bst_smear_node_list {
     /* the same of the predicted error: at most the bound, which takes the greatest derivative of
      * the PSF for the whole length of a group */
     double predicted[BST_NODE_SCALES];
-    /* what is predicted without the missed highest moments, which are derivatives of the image of
-     * order 2 n along the groups: bits n of `orders`, d of `directions`; both 0 if the PSF's
-     * derivatives are not known by direction */
-    double higher[BST_NODE_SCALES];
-    unsigned orders, directions;
+    /* what is predicted without the missed highest moments, and those by their pattern in the
+     * image; bits d of `directions` along which they are, 0 if the PSF's derivatives are not known
+     * by direction */
+    double higher[BST_NODE_SCALES], missed[BST_NODE_SCALES][BST_PATTERNS];
+    unsigned directions;
     bool rests; /* a path of the nodes rests somewhere (bst_motion_rests) */
 } bst_smear_node_list;
 
@@ -60,6 +60,14 @@ enum { BST_NODE_DIRECTIONS = 12, BST_ROW_STEPS = 32 };
 /* Smoothing for which its derivatives are known: variances of n / BST_SMOOTH_PER of that of the
  * Gaussian, along the direction. */
 enum { BST_SMOOTH_STEPS = 5, BST_SMOOTH_PER = 10 };
+
+/* Patterns of missed highest moments in the image: a row of equal groups, and the derivatives of
+ * order 4 and 6 of a group, smoothed by at least n of those steps. */
+enum {
+    BST_PATTERN_ROW,
+    BST_PATTERN_GROUP, /* + 2 n, + 1 for order 6 */
+    BST_PATTERNS = BST_PATTERN_GROUP + 2 * BST_SMOOTH_STEPS
+};
 
 /* Distances from a PSF's peak for which its light is known: BST_LIGHT_STEPS of 1 / BST_LIGHT_PER
  * sigma. */

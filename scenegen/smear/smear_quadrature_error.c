@@ -65,11 +65,11 @@ bst_smear_direction_parts bst_smear_find_direction_parts(const bst_smear_maker *
 }
 
 double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
-                          const bst_smear_rule *r, double scale, double one) {
+                          const bst_smear_rule *r, double scale) {
     if (!m->direction_part || r->nodes < 2) {
-        return one;
+        return 0.0;
     }
-    double low = r->node[0], high = r->node[0], worst = one;
+    double low = r->node[0], high = r->node[0], worst = 0.0;
     for (int i = 1; i < r->nodes; i++) {
         low = fmin(low, r->node[i]);
         high = fmax(high, r->node[i]);
@@ -106,7 +106,8 @@ void bst_smear_nodes_clear(bst_smear_node_list *list) {
     memset(list->error, 0, sizeof list->error);
     memset(list->predicted, 0, sizeof list->predicted);
     memset(list->higher, 0, sizeof list->higher);
-    list->orders = list->directions = 0U;
+    memset(list->missed, 0, sizeof list->missed);
+    list->directions = 0U;
     list->rests = false;
 }
 
