@@ -28,7 +28,7 @@ typedef struct measuring {
     float light[BST_FLANKS][SIDE * SIDE], quiet[BST_FLANKS][SIDE * SIDE];
     bst_light_flank flank[BST_FLANKS][BST_NODE_DIRECTIONS][3];
     bst_light_flank smooth_flank[BST_NODE_DIRECTIONS][BST_SMOOTH_STEPS - 1][2];
-    bst_light_flank row_flank[BST_NODE_DIRECTIONS];
+    bst_light_flank row_flank[BST_NODE_DIRECTIONS][BST_ROW_LENGTHS];
     /* of the frequencies about each step of a row along the direction, across it */
     double across[BST_ROW_STEPS + 1][SIDE][2];
 } measuring;
@@ -125,35 +125,6 @@ static void add_derivative(measuring *m, int part, double gaussian, int d, int o
     }
 }
 
-/* Raises the errors of a row of equal groups of nodes on a streak: a comb, of whose frequencies w =
- * 2 pi / length the image keeps the OTF's. Relative to the streak's light that is 2 w^k A(w) /
- * A(0), with A the integral of the OTF's modulus across the direction. The Peano kernel of a group
- * of uniform motion reduces it: its variance is 0.0198 (two nodes) and 0.0152 (three) of the length
- * squared, so that exp(-w^2 variance / 2) is always the same. */
-static void add_row(const measuring *m, double angle, double sigma_px,
-                    double row[BST_ROW_STEPS][2]) {
-    enum { WIDTH = 2 }; /* steps of the lattice: as many points in each */
-    static const double kernel[2] = {0.68, 0.74};
-    double across[BST_ROW_STEPS + 1] = {0.0};
-    for (int k = 0; k < LATTICE * LATTICE; k++) {
-        int i = k % LATTICE - LATTICE / 2, j = k / LATTICE - LATTICE / 2;
-        double at = fabs(i * cos(angle) + j * sin(angle)) / WIDTH;
-        int bin = (int)at;
-        double size = hypot(m->otf[k][0], m->otf[k][1]), part = at - bin;
-        if (bin < BST_ROW_STEPS) {
-            across[bin] += (1.0 - part) * size;
-            across[bin + 1] += part * size;
-        }
-    }
-    for (int b = 1; b < BST_ROW_STEPS; b++) {
-        double w = 2.0 * BST_PI * WIDTH * b * m->step * sigma_px, w4 = w * w * w * w;
-        /* the bins have the frequencies of both signs, that of 0 half as many */
-        double ripple = across[b] / across[0];
-        row[b][0] = fmax(row[b][0], kernel[0] * ripple * w4 / GAUSSIAN[1]);
-        row[b][1] = fmax(row[b][1], kernel[1] * ripple * w4 * w * w / GAUSSIAN[2]);
-    }
-}
-
 /* Adds the image across a direction of one frequency, `across` cycles/px along that, to those of
  * two steps of a row, by weights. */
 static void add_across(measuring *m, const double otf[2], double across, int bin,
@@ -173,16 +144,9 @@ static void add_across(measuring *m, const double otf[2], double across, int bin
     }
 }
 
-/* Lengths of the groups of a row, sigma. */
-#define SHORTEST_GROUPS 2.0
-#define LONGEST_GROUPS 6.0
-/* Ripple of a row, over the greatest, below which its pattern does not count. */
-#define LEAST_RIPPLE 1e-3
-
-/* Raises a flank to the patterns of rows across their streak: the image of the frequencies about
- * that of the groups along the direction, beside the light of those about 0. */
-static void add_row_flank(measuring *m, double angle, double sigma_px, bst_light_flank *flank) {
-    enum { WIDTH = 2 }; /* as of add_row */
+/* Images across a streak along a direction of the frequencies about each step of a row. */
+static void find_across(measuring *m, double angle) {
+    enum { WIDTH = 2 }; /* steps of the lattice: as many points in each */
     memset(m->across, 0, sizeof m->across);
     for (int k = 0; k < LATTICE * LATTICE; k++) {
         int i = k % LATTICE - LATTICE / 2, j = k / LATTICE - LATTICE / 2;
@@ -197,24 +161,38 @@ static void add_row_flank(measuring *m, double angle, double sigma_px, bst_light
             add_across(m, m->otf[k], (j * cos(angle) - i * sin(angle)) * m->step, bin, weight);
         }
     }
-    double peak = 0.0, top[BST_ROW_STEPS] = {0.0}, most = 0.0;
+}
+
+/* Steps of a row lie between those of its groups. */
+#define UNEQUAL 1.03
+/* Ripple below which its pattern does not count. */
+#define LEAST_RIPPLE 1e-4
+/* Light across a streak, over its peak, below which the lattice resolves nothing. */
+#define LEAST_LIGHT 1e-12
+
+/* Raises the ripples of a row of equal groups of nodes on a streak along direction d, and their
+ * pattern across it: a comb, of whose frequencies w = 2 pi / length the image keeps the OTF's.
+ * Relative to the streak's light that is 2 A(w) / A(0), with A the greatest value across the
+ * streak of the image of these frequencies. */
+static void add_row(measuring *m, int d, double sigma_px, bst_psf_sensitivity *out) {
+    double peak = 0.0, per_sigma = out->most_per_px * sigma_px / BST_ROW_STEPS;
+    find_across(m, d * BST_PI / BST_NODE_DIRECTIONS);
     for (int v = 0; v < SIDE; v++) {
         peak = fmax(peak, m->across[0][v][0]);
     }
-    int first = (int)(1.0 / (LONGEST_GROUPS * sigma_px * WIDTH * m->step)) + 1;
-    int last = (int)(1.0 / (SHORTEST_GROUPS * sigma_px * WIDTH * m->step));
-    last = last < BST_ROW_STEPS ? last : BST_ROW_STEPS - 1;
-    for (int b = first; b <= last; b++) {
+    for (int b = 1; b < BST_ROW_STEPS; b++) {
+        double top = 0.0, length = 1.0 / (b * per_sigma);
         for (int v = 0; v < SIDE; v++) {
-            top[b] = fmax(top[b], hypot(m->across[b][v][0], m->across[b][v][1]));
+            top = fmax(top, hypot(m->across[b][v][0], m->across[b][v][1]));
         }
-        most = fmax(most, top[b]);
-    }
-    for (int b = first; b <= last; b++) {
-        for (int v = 0; v < SIDE && top[b] > LEAST_RIPPLE * most; v++) {
-            double share = fmax(m->across[0][v][0] / peak, 1e-12);
-            double error = hypot(m->across[b][v][0], m->across[b][v][1]) / top[b];
-            bst_light_flank_raise(flank, share, error, error / sqrt(share));
+        out->row[d][b] = fmax(out->row[d][b], 2.0 * top / peak);
+        int first = bst_row_length(length / UNEQUAL), last = bst_row_length(length * UNEQUAL);
+        for (int v = 0; v < SIDE && top > LEAST_RIPPLE * peak; v++) {
+            double share = fmax(m->across[0][v][0] / peak, LEAST_LIGHT);
+            double error = hypot(m->across[b][v][0], m->across[b][v][1]) / top;
+            for (int n = first; n <= last; n++) {
+                bst_light_flank_raise(&m->row_flank[d][n], share, error, error / sqrt(share));
+            }
         }
     }
 }
@@ -307,8 +285,7 @@ static void measure_node(measuring *m, const bst_psf *psf, int node, double sigm
         add_derivative(m, 1, GAUSSIAN[2] * peak / (square * square * square), d, 2, out);
         add_smoothed(m, d, peak, sigma_px, out->smooth[d]);
         memcpy(out->smooth[d][0], &out->part[d][1], sizeof out->smooth[d][0]);
-        add_row(m, angle, sigma_px, out->row[d]);
-        add_row_flank(m, angle, sigma_px, &m->row_flank[d]);
+        add_row(m, d, sigma_px, out);
     }
 }
 
@@ -329,8 +306,9 @@ static void make_curves(const measuring *m, bst_psf_sensitivity *out) {
             }
             bst_flank_curve_raise(any, curve);
         }
-        bst_flank_curve_make(&m->row_flank[d], &out->row_flank[d]);
-        bst_flank_curve_raise(any, &out->row_flank[d]);
+        for (int n = 0; n < BST_ROW_LENGTHS; n++) {
+            bst_flank_curve_make(&m->row_flank[d][n], &out->row_flank[d][n]);
+        }
     }
 }
 

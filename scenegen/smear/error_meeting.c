@@ -2,6 +2,7 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 /* More sources, or blocks of nodes, are left to the budget. */
@@ -215,6 +216,22 @@ double bst_error_meeting_sigma(bst_error_budget *budget, const bst_error_meeting
         free(m->y);
         free(m->boxes);
         free(m);
+    }
+    if (getenv("TIGHT_TERMS")) {
+        double dark = bst_error_budget_frame_motion(budget)->dark_variance_e2, own = 0.0;
+        int at = 0;
+        for (int i = 0; i < count; i++) {
+            double e = (double)sources[i].predicted_e / sqrt((double)sources[i].peak_e + dark);
+            at = e > own ? i : at;
+            own = fmax(own, e);
+        }
+        if (count) {
+            double noise = sqrt((double)sources[at].peak_e + dark);
+            printf("TERMS old %.5f limited %.5f nodes %.5f own %.5f grid %.5f bound %.5f excess %.5f border %.5f shared %.5f apart %d n %d L/D %.3g blocks %d\n",
+                   bst_error_budget_error_sigma(budget), bst_error_budget_limited_sigma(budget, nodes), nodes, own,
+                   (double)sources[at].grid_e / noise, (double)sources[at].nodes_e / noise, (double)sources[at].excess_e / noise,
+                   (double)sources[at].border_e / sqrt(dark), (double)sources[at].shared_e / noise, sources[at].apart, count, (double)sources[at].peak_e / dark, paths->sources[at].blocks);
+        }
     }
     return bst_error_budget_limited_sigma(budget, nodes);
 }

@@ -1,5 +1,6 @@
 /* Image error of a source from the errors of its nodes. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "scenegen/smear/gaussian_flank.h"
@@ -109,8 +110,9 @@ bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) {
 /* Curve of the errors beside the peak of a pattern along direction d. */
 static const bst_flank_curve *curve_of(const bst_psf_sensitivity *of, int flank, int pattern,
                                        int d) {
-    if (pattern == BST_PATTERN_ROW) {
-        return flank == BST_FLANK_STREAK ? &of->row_flank[d] : &of->any_flank[flank];
+    if (pattern < BST_PATTERN_GROUP) {
+        return flank == BST_FLANK_STREAK ? &of->row_flank[d][pattern - BST_PATTERN_ROW]
+                                         : &of->any_flank[flank];
     }
     int step = (pattern - BST_PATTERN_GROUP) / 2, order = (pattern - BST_PATTERN_GROUP) % 2;
     return flank == BST_FLANK_STREAK && step > 0 ? &of->smooth_flank[d][step - 1][order]
@@ -136,7 +138,9 @@ static double pattern_flank(const bst_smear *s, const bst_smear_drawn *drawn, in
             }
         }
         most = fmax(most, fmin(part, 1.0 - higher) * beside);
+        if (getenv("TIGHT_FLANK") && part > 0.05) printf("  p%d part %.2f beside %.2f;", p, part, beside);
     }
+    if (getenv("TIGHT_FLANK")) printf("FLANK f%d any %.2f higher %.2f(%.2f) flank %.2f scale %.2f dirs %x L/D %.3g\n", flank, any, higher, level->higher_part[7], higher*any+most, drawn->scale, level->directions, (double)s->last_read_e/s->dark_variance_e2);
     return higher * any + most;
 }
 

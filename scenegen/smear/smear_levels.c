@@ -32,7 +32,7 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path
         double more = s->wide_field - 1.0, distorted = bst_camera_distorted(&s->camera) ? 2.0 : 0.0;
         aim.direction_part = s->sensitivity->part;
         aim.smooth_part = s->sensitivity->smooth;
-        aim.row_part = s->sensitivity->row;
+        aim.row_ripple = s->sensitivity->row;
         aim.most_per_px = s->sensitivity->most_per_px;
         aim.light_part = s->sensitivity->light;
         aim.turns = turns;

@@ -228,13 +228,14 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
            jump = beside < BESIDE_A_JUMP ? 1.0 : beside;
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
         double fourth = square * square, alone = fmin(one[k], part[k]), many = 0.0;
+        int row = BST_PATTERN_ROW;
         double low = square * (square > 1.0 ? sqrt(square) : 1.0);
         double fixed = r->fixed * fmax(low, 1.0);
         double higher = (r->error - r->missed - r->fixed) * low;
         double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
         double bound = fixed + higher + missed;
         if (one[k] < part[k]) {
-            many = fmin(bst_smear_row_part(m, &along, r, sqrt(square)), part[k]);
+            many = fmin(bst_smear_row_part(m, &along, r, sqrt(square), &row), part[k]);
             part[k] = fmax(many, alone);
         }
         double rest = jump * (along.second * fixed + along.higher * higher);
@@ -242,9 +243,9 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
         double predicted = rest + part[k] * missed;
         list->higher[k] = rest > list->higher[k] ? rest : list->higher[k];
         if (m->direction_part && r->nodes > 1) {
-            double *of = list->missed[k], *group = of + pattern_of(m, r, square);
-            *group = fmax(*group, beside * alone * missed);
-            of[BST_PATTERN_ROW] = fmax(of[BST_PATTERN_ROW], beside * many * missed);
+            double *of = list->missed[k], *alike = of + pattern_of(m, r, square);
+            *alike = fmax(*alike, beside * alone * missed);
+            of[row] = fmax(of[row], beside * many * missed);
         }
         list->error[k] = bound > list->error[k] ? bound : list->error[k];
         list->predicted[k] = predicted > list->predicted[k] ? predicted : list->predicted[k];
@@ -508,7 +509,7 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .further_variance = aim->further_variance,
         .direction_part = aim->direction_part,
         .smooth_part = aim->smooth_part,
-        .row_part = aim->row_part,
+        .row_ripple = aim->row_ripple,
         .most_per_px = aim->most_per_px,
         .light_part = aim->light_part,
         .turns = aim->turns,
