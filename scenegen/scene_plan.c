@@ -93,7 +93,10 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
         bst_fourier_point point = {.electrons = source->electrons_per_s * m->duration_s,
                                    .peak_e = bst_smear_last_read_e(m->smear),
                                    .dark_variance_e2 = m->dark_e2,
-                                   .wings = presence < 1.0};
+                                   .gap_px = presence < 1.0 ? bst_smear_last_gap_px(m->smear) : 0.0};
+        if (point.gap_px > 0.0) { /* of the whole path */
+            point.peak_e = point.electrons * bst_fourier_render_band(m->fourier)->peak;
+        }
         bst_window window = m->request->window;
         double grid = bst_fourier_render_error_sigma(m->fourier, m->fine, window, &point);
         error.nodes_e = sum_of((double)error.nodes_e, grid * noise_e);

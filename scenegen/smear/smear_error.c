@@ -238,6 +238,7 @@ void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
         return;
     }
     s->last_presence = presence;
+    s->last_gap_px = gap;
     e->nodes_e *= (float)presence;
     e->predicted_e *= (float)presence;
     e->shared_e *= (float)presence;

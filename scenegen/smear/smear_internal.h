@@ -87,7 +87,7 @@ struct bst_smear {
     bool single;         /* the stars share one track */
     double spread_px;    /* largest deviation of corner stars from a shared track */
     double travel_px;    /* largest distance of a node from its source's position */
-    double last_peak_e, last_read_e, last_presence, last_widening_px2;
+    double last_peak_e, last_read_e, last_presence, last_gap_px, last_widening_px2;
     bool last_leaves;
     double chord_error; /* error of the latest source's chord approximation, relative to its peak */
     double body_sigma;  /* of the latest body's image but for its nodes, in sigma of the worst
