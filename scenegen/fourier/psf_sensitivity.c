@@ -295,7 +295,6 @@ static void make_curves(const measuring *m, bst_psf_sensitivity *out) {
         bst_flank_curve_make(&m->flank[f][d][order], &out->flank[f][d][order]);
         bst_flank_curve_raise(&out->any_flank[f], &out->flank[f][d][order]);
     }
-    bst_flank_curve *any = &out->any_flank[BST_FLANK_STREAK];
     for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
         for (int k = 2 * (BST_SMOOTH_STEPS - 1) - 1; k >= 0; k--) {
             int n = k / 2, order = k % 2;
@@ -304,7 +303,6 @@ static void make_curves(const measuring *m, bst_psf_sensitivity *out) {
             if (n + 2 < BST_SMOOTH_STEPS) {
                 bst_flank_curve_raise(curve, &out->smooth_flank[d][n + 1][order]);
             }
-            bst_flank_curve_raise(any, curve);
         }
         for (int n = 0; n < BST_ROW_LENGTHS; n++) {
             bst_flank_curve_make(&m->row_flank[d][n], &out->row_flank[d][n]);

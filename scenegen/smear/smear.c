@@ -575,10 +575,6 @@ double bst_smear_last_presence(const bst_smear *s) {
     return s->last_presence;
 }
 
-double bst_smear_last_gap_px(const bst_smear *s) {
-    return s->last_gap_px;
-}
-
 double bst_smear_last_widening_px2(const bst_smear *s) {
     return s->last_widening_px2;
 }

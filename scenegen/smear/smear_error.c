@@ -128,7 +128,7 @@ static double pattern_flank(const bst_smear *s, const bst_smear_drawn *drawn, in
     for (; k > 0 && square < 1.0; k--, square *= 2.0) {
     }
     double any = bst_flank_curve_value(&s->flanks[flank], place), higher = level->higher_part[k],
-           most = 0.0;
+           most = higher * any;
     for (int p = 0; p < BST_PATTERNS; p++) {
         double part = fmax(level->missed_part[k][p], level->missed_part[k + 1][p]), beside = 0.0;
         for (int d = 0; d < BST_NODE_DIRECTIONS && part > 0.0; d++) {
@@ -137,11 +137,12 @@ static double pattern_flank(const bst_smear *s, const bst_smear_drawn *drawn, in
                 beside = fmax(beside, bst_flank_curve_value(curve, place));
             }
         }
-        most = fmax(most, fmin(part, 1.0 - higher) * beside);
+        most = fmax(most, higher * any + fmin(part, 1.0 - higher) * beside);
+        most = fmax(most, part * beside);
         if (getenv("TIGHT_FLANK") && part > 0.05) printf("  p%d part %.2f beside %.2f;", p, part, beside);
     }
-    if (getenv("TIGHT_FLANK")) printf("FLANK f%d any %.2f higher %.2f(%.2f) flank %.2f scale %.2f dirs %x L/D %.3g\n", flank, any, higher, level->higher_part[7], higher*any+most, drawn->scale, level->directions, (double)s->last_read_e/s->dark_variance_e2);
-    return higher * any + most;
+    if (getenv("TIGHT_FLANK")) printf("FLANK f%d any %.2f higher %.2f(%.2f) flank %.2f scale %.2f dirs %x L/D %.3g\n", flank, any, higher, level->higher_part[7], most, drawn->scale, level->directions, (double)s->last_read_e/s->dark_variance_e2);
+    return most;
 }
 
 /* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
@@ -246,4 +247,8 @@ void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
     if (gaussian && gap > d->radius + 2.0) {
         e->excess_e = 0.0f;
     }
+}
+
+double bst_smear_last_gap_px(const bst_smear *s) {
+    return s->last_gap_px;
 }

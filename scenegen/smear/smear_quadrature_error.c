@@ -70,8 +70,23 @@ static double ripple_at(const double ripple[BST_ROW_STEPS], double at) {
     return ripple[n] + (at - n) * (ripple[n + 1] - ripple[n]);
 }
 
+/* Greatest product of ripple and power of the frequency about one, of a row in direction d: groups
+ * beside others of unlike speed are no even row, which has a range of frequencies. */
+static double row_error(const double ripple[BST_ROW_STEPS], double at, bool even, int power) {
+    enum { STEPS = 2 };
+    static const double RANGE = 0.15;
+    double worst = 0.0;
+    for (int k = even ? 0 : -STEPS; k <= (even ? 0 : STEPS); k++) {
+        double part = 1.0 + RANGE * k / STEPS, step = part * at;
+        double error = step < BST_ROW_STEPS - 1 ? ripple_at(ripple, step) : 0.0;
+        worst = fmax(worst, error * (power == 4 ? part * part : part * part * part) *
+                                (power == 4 ? part * part : part * part * part));
+    }
+    return worst;
+}
+
 double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
-                          const bst_smear_rule *r, double scale, int *pattern) {
+                          const bst_smear_rule *r, double scale, bool even, int *pattern) {
     /* factor by the Peano kernel of a group of uniform motion: its variance is 0.0198 (two nodes)
      * and 0.0152 (three) of the length squared, so that exp(-w^2 variance / 2) is the same for all */
     static const double kernel[2] = {0.68, 0.74}, gaussian[2] = {3.0, 15.0};
@@ -87,8 +102,10 @@ double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_pa
     /* outer nodes of Gauss-Legendre quadrature: 0.577 and 0.775 of the length apart */
     double length = (high - low) / (r->nodes == 2 ? 0.57735027 : 0.77459667) * scale;
     double at = BST_ROW_STEPS / fmax(m->most_per_px * length, 1e-9);
-    for (int d = 0; d < BST_NODE_DIRECTIONS && at < BST_ROW_STEPS - 1; d++) {
-        worst = parts->in_range[d] ? fmax(worst, ripple_at(m->row_ripple[d], at)) : worst;
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        if (parts->in_range[d]) {
+            worst = fmax(worst, row_error(m->row_ripple[d], at, even, 2 * r->nodes));
+        }
     }
     double sigma = sqrt(m->variance), w = 2.0 * BST_PI * sigma / fmax(length, 1e-9), w4 = w * w * w * w;
     *pattern = BST_PATTERN_ROW + bst_row_length(length / sigma);

@@ -114,9 +114,9 @@ void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_direction_
 bst_smear_direction_parts bst_smear_find_direction_parts(const bst_smear_maker *m,
                                                          const double axis[3], int nodes);
 /* The part of `missed` in a row of such groups, if the image moves by `scale` of the path; 0 if it
- * is not known. *pattern: which of the row's it has. */
+ * is not known. even: it is beside groups of like speed; *pattern: which of the row's it has. */
 double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
-                          const bst_smear_rule *r, double scale, int *pattern);
+                          const bst_smear_rule *r, double scale, bool even, int *pattern);
 
 /* Replaces *best by the rule with the fewest nodes that meets the tolerance, otherwise by the best
  * of three nodes. Rules with an error beyond `limit` are ignored. */
