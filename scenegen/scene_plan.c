@@ -90,10 +90,11 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
     if (m->fourier) { /* error of grid and widening, on dark pixels too */
         double presence = bst_smear_last_presence(m->smear),
                noise_e = sqrt((double)error.peak_e + m->dark_e2);
-        bst_fourier_point point = {.electrons = source->electrons_per_s * m->duration_s,
-                                   .peak_e = bst_smear_last_read_e(m->smear),
-                                   .dark_variance_e2 = m->dark_e2,
-                                   .gap_px = presence < 1.0 ? bst_smear_last_gap_px(m->smear) : 0.0};
+        bst_fourier_point point = {
+            .electrons = source->electrons_per_s * m->duration_s,
+            .peak_e = bst_smear_last_read_e(m->smear),
+            .dark_variance_e2 = m->dark_e2,
+            .gap_px = presence < 1.0 ? bst_smear_last_gap_px(m->smear) : 0.0};
         if (point.gap_px > 0.0) { /* of the whole path */
             point.peak_e = point.electrons * bst_fourier_render_band(m->fourier)->peak;
         }

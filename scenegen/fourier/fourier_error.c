@@ -137,7 +137,8 @@ static void add_node_errors(lattice *l, int node, int binning, double peak,
         out->most[k] = fmax(out->most[k], error / peak);
         double widened = at[WIDENED * SIDE * SIDE] / peak;
         out->widened[k] = fmax(out->widened[k], widened);
-        int x = abs((i + SIDE / 2) % SIDE - SIDE / 2), y = abs((i / SIDE + SIDE / 2) % SIDE - SIDE / 2);
+        int x = abs((i + SIDE / 2) % SIDE - SIDE / 2),
+            y = abs((i / SIDE + SIDE / 2) % SIDE - SIDE / 2);
         double steps = (x > y ? x : y) / (SIDE * l->step * BST_FAR_STEP_PX);
         int n = steps < BST_FAR_STEPS - 1 ? (int)steps : BST_FAR_STEPS - 1;
         out->far[n] = fmax(out->far[n], error / peak);

@@ -33,7 +33,7 @@ typedef struct bst_fourier_point {
     double peak_e;           /* light in its brightest pixel */
     double dark_variance_e2; /* noise variance of a dark pixel */
     double widening_px2;     /* of its nodes */
-    double gap_px;           /* distance from the window, which contains only its wings; 0: inside */
+    double gap_px; /* distance from the window, which contains only its wings; 0: inside */
 } bst_fourier_point;
 
 /* Error of the worst pixel of a point, in that pixel's sigma. */

@@ -2,7 +2,6 @@
 
 #include <assert.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 /* More sources, or blocks of nodes, are left to the budget. */
@@ -40,8 +39,8 @@ static float place_nodes(const meeting *m, const bst_kernel_source_record *s, in
         float d = r[6 * BST_BLOCK] * s->x_px + r[7 * BST_BLOCK] * s->y_px;
         float depth = d + r[8 * BST_BLOCK];
         float dx = r[0] * s->x_px + r[1 * BST_BLOCK] * s->y_px + r[2 * BST_BLOCK] - s->x_px * d;
-        float dy =
-            r[3 * BST_BLOCK] * s->x_px + r[4 * BST_BLOCK] * s->y_px + r[5 * BST_BLOCK] - s->y_px * d;
+        float dy = r[3 * BST_BLOCK] * s->x_px + r[4 * BST_BLOCK] * s->y_px + r[5 * BST_BLOCK] -
+                   s->y_px * d;
         x[n] = s->x_px + dx / depth;
         y[n] = s->y_px + dy / depth;
         if (!(depth > 0.0f)) {
@@ -115,8 +114,8 @@ static double reaching(meeting *m, int i, int j) {
     const bst_error_budget_source *a = &m->sources[i], *b = &m->sources[j];
     double size = fmax(m->sigma_px[i], m->sigma_px[j]), near = NEAR_SIGMAS * size;
     double met = BST_ERROR_REST * m->error[j], spot = fmax(m->motion.sigma_px, 1.0);
-    if (!a->apart && !b->apart && hypot((double)(a->x_px - b->x_px), (double)(a->y_px - b->y_px)) <
-                                      sqrt(2.0) * spot) {
+    if (!a->apart && !b->apart &&
+        hypot((double)(a->x_px - b->x_px), (double)(a->y_px - b->y_px)) < sqrt(2.0) * spot) {
         return m->error[j]; /* two at one place */
     }
     double slack = 2.0 * SPACING_SIGMAS * size, touch = near + m->paths.binning + slack;
@@ -216,22 +215,6 @@ double bst_error_meeting_sigma(bst_error_budget *budget, const bst_error_meeting
         free(m->y);
         free(m->boxes);
         free(m);
-    }
-    if (getenv("TIGHT_TERMS")) {
-        double dark = bst_error_budget_frame_motion(budget)->dark_variance_e2, own = 0.0;
-        int at = 0;
-        for (int i = 0; i < count; i++) {
-            double e = (double)sources[i].predicted_e / sqrt((double)sources[i].peak_e + dark);
-            at = e > own ? i : at;
-            own = fmax(own, e);
-        }
-        if (count) {
-            double noise = sqrt((double)sources[at].peak_e + dark);
-            printf("TERMS old %.5f limited %.5f nodes %.5f own %.5f grid %.5f bound %.5f excess %.5f border %.5f shared %.5f apart %d n %d L/D %.3g blocks %d\n",
-                   bst_error_budget_error_sigma(budget), bst_error_budget_limited_sigma(budget, nodes), nodes, own,
-                   (double)sources[at].grid_e / noise, (double)sources[at].nodes_e / noise, (double)sources[at].excess_e / noise,
-                   (double)sources[at].border_e / sqrt(dark), (double)sources[at].shared_e / noise, sources[at].apart, count, (double)sources[at].peak_e / dark, paths->sources[at].blocks);
-        }
     }
     return bst_error_budget_limited_sigma(budget, nodes);
 }

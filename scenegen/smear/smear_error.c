@@ -1,6 +1,5 @@
 /* Image error of a source from the errors of its nodes. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 #include "scenegen/smear/gaussian_flank.h"
@@ -139,9 +138,7 @@ static double pattern_flank(const bst_smear *s, const bst_smear_drawn *drawn, in
         }
         most = fmax(most, higher * any + fmin(part, 1.0 - higher) * beside);
         most = fmax(most, part * beside);
-        if (getenv("TIGHT_FLANK") && part > 0.05) printf("  p%d part %.2f beside %.2f;", p, part, beside);
     }
-    if (getenv("TIGHT_FLANK")) printf("FLANK f%d any %.2f higher %.2f(%.2f) flank %.2f scale %.2f dirs %x L/D %.3g\n", flank, any, higher, level->higher_part[7], most, drawn->scale, level->directions, (double)s->last_read_e/s->dark_variance_e2);
     return most;
 }
 

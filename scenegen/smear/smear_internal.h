@@ -31,9 +31,9 @@ typedef struct bst_smear_level {
      * bst_smear_node_list */
     double higher_part[BST_NODE_SCALES], missed_part[BST_NODE_SCALES][BST_PATTERNS];
     unsigned directions;
-    bool rests;                        /* as of bst_smear_node_list */
-    bool alike;                        /* predicted errors are the bounds: all groups are short */
-    double widening_px2;               /* largest mean widening of the nodes at one place */
+    bool rests;          /* as of bst_smear_node_list */
+    bool alike;          /* predicted errors are the bounds: all groups are short */
+    double widening_px2; /* largest mean widening of the nodes at one place */
 } bst_smear_level;
 
 /* A level computed ahead of its first use, on another thread. */

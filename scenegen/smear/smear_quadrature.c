@@ -235,7 +235,8 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
         double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
         double bound = fixed + higher + missed;
         if (one[k] < part[k]) {
-            many = fmin(bst_smear_row_part(m, &along, r, sqrt(square), beside <= 1.0, &row), part[k]);
+            many =
+                fmin(bst_smear_row_part(m, &along, r, sqrt(square), beside <= 1.0, &row), part[k]);
             part[k] = fmax(many, alone);
         }
         double rest = jump * (along.second * fixed + along.higher * higher);

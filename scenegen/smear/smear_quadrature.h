@@ -53,7 +53,7 @@ static inline int bst_row_length(double sigmas) {
 /* Patterns of missed highest moments in the image: a row of equal groups, and the derivatives of
  * order 4 and 6 of a group, smoothed by at least n of those steps. */
 enum {
-    BST_PATTERN_ROW, /* + bst_row_length */
+    BST_PATTERN_ROW,                                       /* + bst_row_length */
     BST_PATTERN_GROUP = BST_PATTERN_ROW + BST_ROW_LENGTHS, /* + 2 n, + 1 for order 6 */
     BST_PATTERNS = BST_PATTERN_GROUP + 2 * BST_SMOOTH_STEPS
 };

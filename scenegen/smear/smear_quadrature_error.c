@@ -88,7 +88,8 @@ static double row_error(const double ripple[BST_ROW_STEPS], double at, bool even
 double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
                           const bst_smear_rule *r, double scale, bool even, int *pattern) {
     /* factor by the Peano kernel of a group of uniform motion: its variance is 0.0198 (two nodes)
-     * and 0.0152 (three) of the length squared, so that exp(-w^2 variance / 2) is the same for all */
+     * and 0.0152 (three) of the length squared, so that exp(-w^2 variance / 2) is the same for all
+     */
     static const double kernel[2] = {0.68, 0.74}, gaussian[2] = {3.0, 15.0};
     *pattern = BST_PATTERN_ROW;
     if (!m->direction_part || r->nodes < 2) {
@@ -107,7 +108,8 @@ double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_pa
             worst = fmax(worst, row_error(m->row_ripple[d], at, even, 2 * r->nodes));
         }
     }
-    double sigma = sqrt(m->variance), w = 2.0 * BST_PI * sigma / fmax(length, 1e-9), w4 = w * w * w * w;
+    double sigma = sqrt(m->variance), w = 2.0 * BST_PI * sigma / fmax(length, 1e-9),
+           w4 = w * w * w * w;
     *pattern = BST_PATTERN_ROW + bst_row_length(length / sigma);
     worst *= kernel[r->nodes - 2] * (r->nodes == 2 ? w4 : w4 * w * w);
     return worst / (gaussian[r->nodes - 2] * m->pixel_part[r->nodes - 1]);

@@ -22,8 +22,8 @@ static int setup(void **state) {
     for (int n = 0; n < NODES; n++) {
         double angle = 1.5707963267948966 * n / (NODES - 1);
         float *t = f->table + n / BST_BLOCK * BST_TABLE_ROWS * BST_BLOCK + n % BST_BLOCK;
-        const double rows[9] = {cos(angle) - 1.0, -sin(angle), 0.0, sin(angle), cos(angle) - 1.0,
-                                0.0,              0.0,         0.0, 1.0};
+        const double rows[9] = {
+            cos(angle) - 1.0, -sin(angle), 0.0, sin(angle), cos(angle) - 1.0, 0.0, 0.0, 0.0, 1.0};
         for (int i = 0; i < 9; i++) {
             t[i * BST_BLOCK] = (float)rows[i];
         }

@@ -60,11 +60,7 @@ static outcome render(fixture *f, scene *s) {
     float *fast = malloc(pixels * sizeof *fast);
     double *reference = calloc(pixels, sizeof *reference);
     bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, fast));
-    if (getenv("TIGHT_FAST")) {
-        for (size_t k = 0; k < pixels; k++) {
-            reference[k] = (double)fast[k] - s->background_e;
-        }
-    } else bst_assert_ok(
+    bst_assert_ok(
         &f->ctx,
         bst_reference_render(&f->ctx, &s->camera, s->window, &s->track.track, s->sources, s->count,
                              s->reference > 0.0 ? s->reference : reference_part, reference));
