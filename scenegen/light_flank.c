@@ -30,17 +30,20 @@ void bst_flank_curve_raise(bst_flank_curve *curve, const bst_flank_curve *other)
     }
 }
 
-double bst_flank_curve_at(const bst_flank_curve *curve, double light) {
+bst_flank_place bst_flank_place_of(double light) {
     int exponent;
     assert(light >= 0.0);
     double part = 2.0 * frexp(light, &exponent) - 1.0; /* light = 2^(exponent - 1) (1 + part) */
     double at = BST_FLANK_PARTS * (exponent - 1 - BST_FLANK_FIRST + part);
     if (!(at > 0.0) || light == 0.0) {
-        return (double)curve->at[0];
+        return (bst_flank_place){0, 1.0};
     }
     /* the error grows with the light, at most as sqrt(light + 1), in each term of
      * bst_flank_curve_make */
     int n = at < BST_FLANK_STEPS - 1 ? (int)at : BST_FLANK_STEPS - 1;
-    double grown = (double)curve->at[n] * sqrt((light + 1.0) / (light_of(n) + 1.0));
-    return n + 1 < BST_FLANK_STEPS ? fmin(grown, (double)curve->at[n + 1]) : grown;
+    return (bst_flank_place){n, sqrt((light + 1.0) / (light_of(n) + 1.0))};
+}
+
+double bst_flank_curve_at(const bst_flank_curve *curve, double light) {
+    return bst_flank_curve_value(curve, bst_flank_place_of(light));
 }

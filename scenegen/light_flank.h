@@ -45,6 +45,25 @@ void bst_flank_curve_make(const bst_light_flank *flank, bst_flank_curve *out);
 /* Raises a curve to another. */
 void bst_flank_curve_raise(bst_flank_curve *curve, const bst_flank_curve *other);
 
+/* Place of a light on any curve: a step, and what the error grows by from there at most. */
+typedef struct bst_flank_place {
+    int step;
+    double grown;
+} bst_flank_place;
+
+/* Finds the place of a peak of `light` times the dark variance. */
+bst_flank_place bst_flank_place_of(double light);
+
+/* Value of a curve at a place, as bst_flank_curve_at. */
+static inline double bst_flank_curve_value(const bst_flank_curve *curve, bst_flank_place place) {
+    double grown = (double)curve->at[place.step] * place.grown;
+    if (place.step + 1 == BST_FLANK_STEPS) {
+        return grown;
+    }
+    double next = (double)curve->at[place.step + 1];
+    return next < grown ? next : grown;
+}
+
 /* Value of a curve for a peak of `light` times the dark variance: at least that of the flank, also
  * between the steps and beyond the last one. */
 double bst_flank_curve_at(const bst_flank_curve *curve, double light);

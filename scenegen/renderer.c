@@ -442,8 +442,9 @@ static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_
         to.first_tile = to.saturated ? r->saturation.tiles[r->set] : 0;
         all.nodes_bounded = all.nodes_bounded || r->stats.nodes_bounded;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
-        all.predicted_sigma = fmax(all.predicted_sigma, bst_error_budget_error_sigma(r->budget) +
-                                                            bst_rolling_error_sigma(r->rolling));
+        double predicted = bst_scene_plan_error_sigma(&r->plan, r->smear, r->budget);
+        all.predicted_sigma =
+            fmax(all.predicted_sigma, predicted + bst_rolling_error_sigma(r->rolling));
         for (int i = 0; i < band.count; i++) {
             double *peak_e = &r->rolled_peak_e[bst_rolling_source(r->rolling, i)];
             all.sources += *peak_e == 0.0 && r->plan.peak_e[i] > 0.0;
@@ -489,7 +490,7 @@ static bst_status render_ramp(bst_ctx *ctx, bst_renderer *r, const bst_render_re
         all.nodes += r->stats.nodes;
         all.nodes_bounded = all.nodes_bounded || r->stats.nodes_bounded;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
-        all.predicted_sigma += bst_error_budget_error_sigma(r->budget);
+        all.predicted_sigma += bst_scene_plan_error_sigma(&r->plan, r->smear, r->budget);
         bst_kernel_frame_params p = bst_render_params(&r->fixed, &r->camera, &r->options, &part, 0);
         BST_TRY(bst_readout_interval(ctx, r->readout, r->detector, &p, q->window, i, part.start_s));
     }

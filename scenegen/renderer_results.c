@@ -42,7 +42,7 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
     *out = r->stats;
     if (!r->summed) {
-        out->predicted_sigma = bst_error_budget_error_sigma(r->budget);
+        out->predicted_sigma = bst_scene_plan_error_sigma(&r->plan, r->smear, r->budget);
     }
     out->predicted_sigma = bst_renderer_is_predictable(r) ? out->predicted_sigma : NAN;
     out->tolerance_missed = out->predicted_sigma > r->options.tolerance_sigma;

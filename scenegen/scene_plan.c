@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "scenegen/smear/error_meeting.h"
 #include "scenegen/source_order.h"
 #include "sim/world/scene/skylight.h"
 
@@ -89,10 +90,14 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
     if (m->fourier) { /* error of grid and widening, on dark pixels too */
         double presence = bst_smear_last_presence(m->smear),
                noise_e = sqrt((double)error.peak_e + m->dark_e2);
-        bst_fourier_point point = {.electrons = source->electrons_per_s * m->duration_s,
-                                   .peak_e = bst_smear_last_read_e(m->smear),
-                                   .dark_variance_e2 = m->dark_e2,
-                                   .wings = presence < 1.0};
+        bst_fourier_point point = {
+            .electrons = source->electrons_per_s * m->duration_s,
+            .peak_e = bst_smear_last_read_e(m->smear),
+            .dark_variance_e2 = m->dark_e2,
+            .gap_px = presence < 1.0 ? bst_smear_last_gap_px(m->smear) : 0.0};
+        if (point.gap_px > 0.0) { /* of the whole path */
+            point.peak_e = point.electrons * bst_fourier_render_band(m->fourier)->peak;
+        }
         bst_window window = m->request->window;
         double grid = bst_fourier_render_error_sigma(m->fourier, m->fine, window, &point);
         error.nodes_e = sum_of((double)error.nodes_e, grid * noise_e);
@@ -102,6 +107,7 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
             grid = bst_fourier_render_error_sigma(m->fourier, m->fine, window, &point);
         }
         error.predicted_e = sum_of((double)error.predicted_e, grid * noise_e);
+        error.grid_e = (float)(grid * noise_e);
         m->widened_sigma = fmax(m->widened_sigma, grid);
         const float *colour = source->colour;
         if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
@@ -277,6 +283,23 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
     int most_blocks = (int)(most / (BST_BLOCK / 2 * BST_BOX_BYTES));
     BST_TRY(plan_to_tolerance(ctx, p, &m, limits->tolerance_sigma, most_blocks));
     p->fine = m.fine;
+    p->binning = binning;
+    p->gaussian = !fourier;
+    p->distorted = bst_camera_distorted(camera);
     put_in_order(p, camera, q->sources);
     return BST_OK;
+}
+
+double bst_scene_plan_error_sigma(const bst_scene_plan *p, const bst_smear *smear,
+                                  bst_error_budget *budget) {
+    assert(p && smear && budget);
+    if (p->distorted) { /* the table's places are without distortion */
+        return bst_error_budget_error_sigma(budget);
+    }
+    int blocks;
+    const bst_error_meeting_paths paths = {.sources = p->list,
+                                           .table = bst_smear_table(smear, &blocks),
+                                           .binning = p->binning,
+                                           .gaussian = p->gaussian};
+    return bst_error_meeting_sigma(budget, &paths);
 }

@@ -18,9 +18,11 @@ typedef struct bst_scene_plan {
     bool bounded;   /* limited by the number of nodes: coarser than the tolerance requires */
     bool fine;      /* on the finer grid of the Fourier path */
     double *peak_e; /* of all sources of the request: most expected electrons in one pixel */
-    bst_kernel_source_record *list; /* work space */
-    bst_smear_result *results;      /* the same, if the smear has threads */
+    bst_kernel_source_record *list; /* [count] the same in the order of the request */
+    bst_smear_result *results;      /* work space, if the smear has threads */
     int capacity;
+    int binning;
+    bool gaussian, distorted; /* the PSF; the camera */
 } bst_scene_plan;
 
 /* Limit of the nodes spent on the tolerance, beyond one block per source: MOST, or the renderer's
@@ -45,6 +47,12 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_cam
                                bst_smear *smear, bst_error_budget *budget,
                                bst_fourier_render *fourier, const bst_scene_plan_limits *limits,
                                const bst_render_request *request) BST_MUST_CHECK;
+
+/* Predicted error of the latest request in any pixel, in its sigma; at most that of the budget.
+ *
+ * Given:     smear, budget  as they are after its planning */
+double bst_scene_plan_error_sigma(const bst_scene_plan *plan, const bst_smear *smear,
+                                  bst_error_budget *budget);
 
 /* Frees the memory of a plan. */
 void bst_scene_plan_clear(bst_scene_plan *plan);

@@ -15,9 +15,6 @@ enum { LATTICE = 96, SIDE = 192 };
  * kernel differs by. */
 enum { WHOLE, ALIAS_X, ALIAS_Y, LOST, WIDENED, IMAGES };
 
-/* First brightness class of the wings: a Gaussian three sigma away is at 0.011. */
-enum { WINGS = 7 };
-
 typedef struct lattice {
     const bst_psf *psf;
     double step, cutoff, alias[2][LATTICE];
@@ -138,7 +135,24 @@ static void add_node_errors(lattice *l, int node, int binning, double peak,
         double error = SAFE * 2.0 * (at[ALIAS_X * SIDE * SIDE] + at[ALIAS_Y * SIDE * SIDE]) +
                        at[LOST * SIDE * SIDE];
         out->most[k] = fmax(out->most[k], error / peak);
-        out->widened[k] = fmax(out->widened[k], at[WIDENED * SIDE * SIDE] / peak);
+        double widened = at[WIDENED * SIDE * SIDE] / peak;
+        out->widened[k] = fmax(out->widened[k], widened);
+        int x = abs((i + SIDE / 2) % SIDE - SIDE / 2),
+            y = abs((i / SIDE + SIDE / 2) % SIDE - SIDE / 2);
+        double steps = (x > y ? x : y) / (SIDE * l->step * BST_FAR_STEP_PX);
+        int n = steps < BST_FAR_STEPS - 1 ? (int)steps : BST_FAR_STEPS - 1;
+        out->far[n] = fmax(out->far[n], error / peak);
+        out->far_widened[n] = fmax(out->far_widened[n], widened);
+    }
+    /* at least as far; nothing is known beyond the images */
+    double known = 0.5 / (l->step * BST_FAR_STEP_PX);
+    for (int n = BST_FAR_STEPS - 2; n >= 0; n--) {
+        out->far[n] = fmax(out->far[n], out->far[n + 1]);
+        out->far_widened[n] = fmax(out->far_widened[n], out->far_widened[n + 1]);
+    }
+    for (int n = (int)known; n < BST_FAR_STEPS; n++) {
+        out->far[n] = out->far[(int)known - 1];
+        out->far_widened[n] = out->far_widened[(int)known - 1];
     }
 }
 
@@ -175,11 +189,13 @@ bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst
 double bst_fourier_error_sigma(const bst_fourier_error *error, const bst_fourier_point *point) {
     double worst = 0.0, light_e = point->peak_e;
     double widened = error->widest_px2 > 0.0 ? point->widening_px2 / error->widest_px2 : 0.0;
+    if (point->gap_px > 0.0) {
+        int n = (int)fmin(point->gap_px / BST_FAR_STEP_PX, BST_FAR_STEPS - 1.0);
+        double part = error->far[n] + widened * error->far_widened[n];
+        return part * point->peak_e / sqrt(point->dark_variance_e2);
+    }
     for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
         light_e = k + 1 < BST_LIGHT_CLASSES ? 0.5 * light_e : 0.0;
-        if (point->wings && k < WINGS) {
-            continue;
-        }
         double part = error->most[k] + widened * error->widened[k];
         worst = fmax(worst, part * point->peak_e / sqrt(light_e + point->dark_variance_e2));
     }

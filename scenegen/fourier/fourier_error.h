@@ -5,12 +5,16 @@
 #include "scenegen/fourier/fourier_grid.h"
 #include "scenegen/light_classes.h"
 
+/* Distances from a point for which its errors are known: steps of BST_FAR_STEP_PX. */
+enum { BST_FAR_STEPS = 24, BST_FAR_STEP_PX = 2 };
+
 typedef struct bst_fourier_error {
-    /* largest error of a pixel of the class, relative to the PSF's peak */
-    double most[BST_LIGHT_CLASSES];
+    /* largest error of a pixel of the class, relative to the PSF's peak; the same of a pixel at
+     * least n steps away along an axis */
+    double most[BST_LIGHT_CLASSES], far[BST_FAR_STEPS];
     /* the same of what the widening kernel differs from a Gaussian's convolution, for a node
      * widened by widest_px2; about in proportion to the widening */
-    double widened[BST_LIGHT_CLASSES], widest_px2;
+    double widened[BST_LIGHT_CLASSES], far_widened[BST_FAR_STEPS], widest_px2;
 } bst_fourier_error;
 
 /* Measures the largest grid errors over all sub-sample positions and field nodes.
@@ -29,7 +33,7 @@ typedef struct bst_fourier_point {
     double peak_e;           /* light in its brightest pixel */
     double dark_variance_e2; /* noise variance of a dark pixel */
     double widening_px2;     /* of its nodes */
-    bool wings;              /* the window contains only its wings */
+    double gap_px; /* distance from the window, which contains only its wings; 0: inside */
 } bst_fourier_point;
 
 /* Error of the worst pixel of a point, in that pixel's sigma. */

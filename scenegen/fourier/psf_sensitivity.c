@@ -27,6 +27,10 @@ typedef struct measuring {
     /* over the peak: of the point, and of a path; one over its square root */
     float light[BST_FLANKS][SIDE * SIDE], quiet[BST_FLANKS][SIDE * SIDE];
     bst_light_flank flank[BST_FLANKS][BST_NODE_DIRECTIONS][3];
+    bst_light_flank smooth_flank[BST_NODE_DIRECTIONS][BST_SMOOTH_STEPS - 1][2];
+    bst_light_flank row_flank[BST_NODE_DIRECTIONS][BST_ROW_LENGTHS];
+    /* of the frequencies about each step of a row along the direction, across it */
+    double across[BST_ROW_STEPS + 1][SIDE][2];
 } measuring;
 
 /* At frequencies of whole cycles per px the limit: its sign does not matter to a modulus, but to
@@ -90,54 +94,106 @@ static double greatest_near(const measuring *m, int k, int part) {
     return here + more;
 }
 
+/* Index of the sample of the greatest absolute value of an image. */
+static int greatest_of(const measuring *m, int part) {
+    int greatest = 0;
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        greatest = fabsf(m->room[k][part]) > fabsf(m->room[greatest][part]) ? k : greatest;
+    }
+    return greatest;
+}
+
+/* Raises a flank to the pattern of an image, of which `top` is the greatest value. */
+static void add_flank(const measuring *m, int part, double top, int light, bst_light_flank *flank) {
+    double per = 1.0 / fmax(top, 1e-30);
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        double value = fabs((double)m->room[k][part]) * per;
+        bst_light_flank_raise(flank, (double)m->light[light][k], value,
+                              value * (double)m->quiet[light][k]);
+    }
+}
+
 /* Raises the sensitivities to those of one derivative of a field node, along direction d. */
 static void add_derivative(measuring *m, int part, double gaussian, int d, int order,
                            bst_psf_sensitivity *out) {
     double *most = &out->part[d][order];
-    double top = 0.0;
-    int greatest = 0;
-    for (int k = 0; k < SIDE * SIDE; k++) {
-        double value = fabs((double)m->room[k][part]);
-        greatest = value > top ? k : greatest;
-        top = fmax(top, value);
-    }
+    int greatest = greatest_of(m, part);
     *most = fmax(*most, greatest_near(m, greatest, part) / gaussian);
-    double per = 1.0 / fmax(top, 1e-30);
-    for (int k = 0; k < SIDE * SIDE; k++) {
-        double value = fabs((double)m->room[k][part]) * per;
-        for (int f = 0; f < BST_FLANKS; f++) {
-            bst_light_flank_raise(&m->flank[f][d][order], (double)m->light[f][k], value,
-                                  value * (double)m->quiet[f][k]);
+    for (int f = 0; f < BST_FLANKS; f++) {
+        double top = fabs((double)m->room[greatest][part]);
+        add_flank(m, part, top, f, &m->flank[f][d][order]);
+    }
+}
+
+/* Adds the image across a direction of one frequency, `across` cycles/px along that, to those of
+ * two steps of a row, by weights. */
+static void add_across(measuring *m, const double otf[2], double across, int bin,
+                       const double weight[2]) {
+    double turn = 2.0 * BST_PI * across / (SIDE * m->step), c = cos(turn), s = sin(turn);
+    double from = -0.5 * SIDE * turn;
+    double z[2] = {otf[0] * cos(from) - otf[1] * sin(from),
+                   otf[1] * cos(from) + otf[0] * sin(from)};
+    for (int v = 0; v < SIDE; v++) {
+        for (int k = 0; k < 2; k++) {
+            m->across[bin + k][v][0] += weight[k] * z[0];
+            m->across[bin + k][v][1] += weight[k] * z[1];
+        }
+        double re = z[0] * c - z[1] * s;
+        z[1] = z[1] * c + z[0] * s;
+        z[0] = re;
+    }
+}
+
+/* Images across a streak along a direction of the frequencies about each step of a row. */
+static void find_across(measuring *m, double angle) {
+    enum { WIDTH = 2 }; /* steps of the lattice: as many points in each */
+    memset(m->across, 0, sizeof m->across);
+    for (int k = 0; k < LATTICE * LATTICE; k++) {
+        int i = k % LATTICE - LATTICE / 2, j = k / LATTICE - LATTICE / 2;
+        double along = (i * cos(angle) + j * sin(angle)) / WIDTH;
+        int bin = (int)fabs(along);
+        double part = fabs(along) - bin;
+        /* the image is twice the real part of that of the positive frequencies */
+        const double weight[2] = {along >= 0.0 || bin == 0 ? 1.0 - part : 0.0,
+                                  along >= 0.0 ? part : 0.0};
+        if (bin < BST_ROW_STEPS && weight[0] + weight[1] > 0.0 &&
+            fabs(m->otf[k][0]) + fabs(m->otf[k][1]) > 1e-9) {
+            add_across(m, m->otf[k], (j * cos(angle) - i * sin(angle)) * m->step, bin, weight);
         }
     }
 }
 
-/* Raises the errors of a row of equal groups of nodes on a streak: a comb, of whose frequencies w =
- * 2 pi / length the image keeps the OTF's. Relative to the streak's light that is 2 w^k A(w) /
- * A(0), with A the integral of the OTF's modulus across the direction. The Peano kernel of a group
- * of uniform motion reduces it: its variance is 0.0198 (two nodes) and 0.0152 (three) of the length
- * squared, so that exp(-w^2 variance / 2) is always the same. */
-static void add_row(const measuring *m, double angle, double sigma_px,
-                    double row[BST_ROW_STEPS][2]) {
-    enum { WIDTH = 2 }; /* steps of the lattice: as many points in each */
-    static const double kernel[2] = {0.68, 0.74};
-    double across[BST_ROW_STEPS + 1] = {0.0};
-    for (int k = 0; k < LATTICE * LATTICE; k++) {
-        int i = k % LATTICE - LATTICE / 2, j = k / LATTICE - LATTICE / 2;
-        double at = fabs(i * cos(angle) + j * sin(angle)) / WIDTH;
-        int bin = (int)at;
-        double size = hypot(m->otf[k][0], m->otf[k][1]), part = at - bin;
-        if (bin < BST_ROW_STEPS) {
-            across[bin] += (1.0 - part) * size;
-            across[bin + 1] += part * size;
-        }
+/* Steps of a row lie between those of its groups. */
+#define UNEQUAL 1.03
+/* Ripple below which its pattern does not count. */
+#define LEAST_RIPPLE 1e-4
+/* Light across a streak, over its peak, below which the lattice resolves nothing. */
+#define LEAST_LIGHT 1e-12
+
+/* Raises the ripples of a row of equal groups of nodes on a streak along direction d, and their
+ * pattern across it: a comb, of whose frequencies w = 2 pi / length the image keeps the OTF's.
+ * Relative to the streak's light that is 2 A(w) / A(0), with A the greatest value across the
+ * streak of the image of these frequencies. */
+static void add_row(measuring *m, int d, double sigma_px, bst_psf_sensitivity *out) {
+    double peak = 0.0, per_sigma = out->most_per_px * sigma_px / BST_ROW_STEPS;
+    find_across(m, d * BST_PI / BST_NODE_DIRECTIONS);
+    for (int v = 0; v < SIDE; v++) {
+        peak = fmax(peak, m->across[0][v][0]);
     }
     for (int b = 1; b < BST_ROW_STEPS; b++) {
-        double w = 2.0 * BST_PI * WIDTH * b * m->step * sigma_px, w4 = w * w * w * w;
-        /* the bins have the frequencies of both signs, that of 0 half as many */
-        double ripple = across[b] / across[0];
-        row[b][0] = fmax(row[b][0], kernel[0] * ripple * w4 / GAUSSIAN[1]);
-        row[b][1] = fmax(row[b][1], kernel[1] * ripple * w4 * w * w / GAUSSIAN[2]);
+        double top = 0.0, length = 1.0 / (b * per_sigma);
+        for (int v = 0; v < SIDE; v++) {
+            top = fmax(top, hypot(m->across[b][v][0], m->across[b][v][1]));
+        }
+        out->row[d][b] = fmax(out->row[d][b], 2.0 * top / peak);
+        int first = bst_row_length(length / UNEQUAL), last = bst_row_length(length * UNEQUAL);
+        for (int v = 0; v < SIDE && top > LEAST_RIPPLE * peak; v++) {
+            double share = fmax(m->across[0][v][0] / peak, LEAST_LIGHT);
+            double error = hypot(m->across[b][v][0], m->across[b][v][1]) / top;
+            for (int n = first; n <= last; n++) {
+                bst_light_flank_raise(&m->row_flank[d][n], share, error, error / sqrt(share));
+            }
+        }
     }
 }
 
@@ -187,19 +243,19 @@ static void keep_light(measuring *m, int flank) {
     }
 }
 
-/* Raises the greatest smoothed derivatives along a direction. */
-static void add_smoothed(measuring *m, double angle, double peak, double sigma_px,
+/* Raises the greatest smoothed derivatives along direction d. */
+static void add_smoothed(measuring *m, int d, double peak, double sigma_px,
                          double smooth[BST_SMOOTH_STEPS][2]) {
+    double angle = d * BST_PI / BST_NODE_DIRECTIONS;
     double square = sigma_px * sigma_px, fourth = square * square;
     for (int n = 1; n < BST_SMOOTH_STEPS; n++) {
         make_images(m, angle, n * square / BST_SMOOTH_PER, (const int[2]){4, 6});
         for (int part = 0; part < 2; part++) {
-            int greatest = 0;
-            for (int k = 0; k < SIDE * SIDE; k++) {
-                greatest = fabsf(m->room[k][part]) > fabsf(m->room[greatest][part]) ? k : greatest;
-            }
+            int greatest = greatest_of(m, part);
             double unit = GAUSSIAN[part + 1] * peak / (part == 0 ? fourth : fourth * square);
             smooth[n][part] = fmax(smooth[n][part], greatest_near(m, greatest, part) / unit);
+            double top = fabs((double)m->room[greatest][part]);
+            add_flank(m, part, top, BST_FLANK_STREAK, &m->smooth_flank[d][n - 1][part]);
         }
     }
 }
@@ -227,9 +283,9 @@ static void measure_node(measuring *m, const bst_psf *psf, int node, double sigm
         make_images(m, angle, 0.0, (const int[2]){4, 6});
         add_derivative(m, 0, GAUSSIAN[1] * peak / (square * square), d, 1, out);
         add_derivative(m, 1, GAUSSIAN[2] * peak / (square * square * square), d, 2, out);
-        add_smoothed(m, angle, peak, sigma_px, out->smooth[d]);
+        add_smoothed(m, d, peak, sigma_px, out->smooth[d]);
         memcpy(out->smooth[d][0], &out->part[d][1], sizeof out->smooth[d][0]);
-        add_row(m, angle, sigma_px, out->row[d]);
+        add_row(m, d, sigma_px, out);
     }
 }
 
@@ -239,13 +295,28 @@ static void make_curves(const measuring *m, bst_psf_sensitivity *out) {
         bst_flank_curve_make(&m->flank[f][d][order], &out->flank[f][d][order]);
         bst_flank_curve_raise(&out->any_flank[f], &out->flank[f][d][order]);
     }
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        for (int k = 2 * (BST_SMOOTH_STEPS - 1) - 1; k >= 0; k--) {
+            int n = k / 2, order = k % 2;
+            bst_flank_curve *curve = &out->smooth_flank[d][n][order];
+            bst_flank_curve_make(&m->smooth_flank[d][n][order], curve);
+            if (n + 2 < BST_SMOOTH_STEPS) {
+                bst_flank_curve_raise(curve, &out->smooth_flank[d][n + 1][order]);
+            }
+        }
+        for (int n = 0; n < BST_ROW_LENGTHS; n++) {
+            bst_flank_curve_make(&m->row_flank[d][n], &out->row_flank[d][n]);
+        }
+    }
 }
 
 bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double cutoff,
                                        double sigma_px, int binning, bst_psf_sensitivity *out) {
     assert(psf && cutoff > 0.0 && sigma_px > 0.0 && binning > 0 && out);
     measuring *m = calloc(1, sizeof *m);
-    *out = (bst_psf_sensitivity){.psf = psf, .cutoff = cutoff};
+    memset(out, 0, sizeof *out);
+    out->psf = psf;
+    out->cutoff = cutoff;
     for (int k = 0; k < BST_NODE_DIRECTIONS * BST_LIGHT_STEPS; k++) {
         out->light[k / BST_LIGHT_STEPS][k % BST_LIGHT_STEPS] = 1.0;
     }

@@ -17,14 +17,17 @@ typedef struct bst_psf_sensitivity {
     /* the same of order 4 and 6, smoothed along the direction by n / BST_SMOOTH_PER of the
      * Gaussian's variance */
     double smooth[BST_NODE_DIRECTIONS][BST_SMOOTH_STEPS][2];
-    /* the same of order 4 and 6 in the image of a streak of equal groups of nodes, by the groups
-     * per px, BST_ROW_STEPS of them up to most_per_px */
-    double row[BST_NODE_DIRECTIONS][BST_ROW_STEPS][2], most_per_px;
+    /* image of a comb along a streak, over the streak's light, by the teeth per px, BST_ROW_STEPS
+     * of them up to most_per_px */
+    double row[BST_NODE_DIRECTIONS][BST_ROW_STEPS], most_per_px;
     /* least light up to n / BST_LIGHT_PER sigma from the peak along the direction, to either side,
      * over that of the peak */
     double light[BST_NODE_DIRECTIONS][BST_LIGHT_STEPS];
     /* of the derivatives of order 2, 4 and 6 along each direction; the greatest of all */
     bst_flank_curve flank[BST_FLANKS][BST_NODE_DIRECTIONS][3], any_flank[BST_FLANKS];
+    /* of a path: of order 4 and 6 smoothed by at least n + 1 steps, and of a row of groups */
+    bst_flank_curve smooth_flank[BST_NODE_DIRECTIONS][BST_SMOOTH_STEPS - 1][2],
+        row_flank[BST_NODE_DIRECTIONS][BST_ROW_LENGTHS];
 } bst_psf_sensitivity;
 
 /* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their centre. */

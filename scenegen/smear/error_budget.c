@@ -7,9 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* REST: share of the other sources' errors that adds where the worst source's error is largest.
- * BORDERS: share of a stamp border's length that passes within its own thickness of a point. */
-#define REST 0.4f
+/* BORDERS: share of a stamp border's length that passes within its own thickness of a point. */
+#define REST ((float)BST_ERROR_REST)
 #define BORDERS 0.1f
 
 /* REACH: cells within two stamp radii of four PSF sigmas each. MOST_CROSSINGS: most cells searched
@@ -53,6 +52,10 @@ struct bst_error_budget {
     double missing_e;     /* light missing everywhere */
     bool above;           /* a predicted error exceeds its bound */
     double error[ERRORS]; /* negative: not computed yet */
+    /* largest errors of a box besides those of nodes, at its sources and next to a stamp; number of
+     * cells */
+    float rest, beside;
+    int boxes;
 };
 
 bst_status bst_error_budget_create(bst_ctx *ctx, bst_error_budget **out) {
@@ -328,7 +331,7 @@ static int fill_cells(bst_error_budget *c, int spots) {
 }
 
 /* Error of the box about a cell, of one kind. */
-static float box_error(const bst_error_budget *c, const cell *middle, int kind) {
+static float box_error(bst_error_budget *c, const cell *middle, int kind) {
     cell sum = {.key = 0};
     float squares = 0.0f, worst = 0.0f, second = 0.0f;
     for (int u = -1; u <= 1; u++) {
@@ -350,8 +353,10 @@ static float box_error(const bst_error_budget *c, const cell *middle, int kind) 
     float part = (float)c->motion.overlap;
     float others = sqrtf(part * fmaxf(squares - worst * worst, 0.0f));
     float excess = sum.worst_excess + part * (sum.excess - sum.worst_excess);
-    return fmaxf(worst + excess, sum.worst_border) + sum.shared + REST * fmaxf(others, second) +
-           BORDERS * (sum.border - sum.worst_border);
+    float all = sum.shared + BORDERS * (sum.border - sum.worst_border);
+    c->rest = greater(c->rest, excess + all);
+    c->beside = greater(c->beside, sum.worst_border + all);
+    return fmaxf(worst + excess, sum.worst_border) + all + REST * fmaxf(others, second);
 }
 
 /* Cells by the square of SIDE cells that they lie in, as lists, to find those within REACH of a
@@ -413,6 +418,8 @@ static void sum_errors(bst_error_budget *c) {
     float worst[ERRORS] = {0.0f}, apart[ERRORS] = {0.0f}, border = 0.0f;
     c->frame++;
     int cells = fill_cells(c, fill_spots(c, apart));
+    c->rest = c->beside = 0.0f;
+    c->boxes = cells;
     /* in the order of the dense array, if there is one */
     int places = c->columns > 0 ? c->columns * c->rows : cells;
     for (int i = 0; i < places; i++) {
@@ -450,4 +457,24 @@ double bst_error_budget_bound_sigma(bst_error_budget *c) {
 double bst_error_budget_error_sigma(bst_error_budget *c) {
     (void)bst_error_budget_bound_sigma(c);
     return c->error[PREDICTED];
+}
+
+double bst_error_budget_limited_sigma(bst_error_budget *c, double nodes_sigma) {
+    double all = bst_error_budget_error_sigma(c);
+    if (!(nodes_sigma < all)) {
+        return all;
+    }
+    double beside = (double)c->beside + BST_ERROR_REST * nodes_sigma;
+    float limited = (float)fmax(nodes_sigma + (double)c->rest, beside);
+    limited = c->boxes > MOST_CROSSINGS ? INFINITY : worst_crossing(c, c->boxes, limited);
+    return fmin(all, (double)limited + c->missing_e / sqrt(c->motion.dark_variance_e2));
+}
+
+const bst_error_budget_source *bst_error_budget_sources(const bst_error_budget *c, int *count) {
+    *count = c->count;
+    return c->sources;
+}
+
+const bst_error_budget_motion *bst_error_budget_frame_motion(const bst_error_budget *c) {
+    return &c->motion;
 }

@@ -36,6 +36,7 @@ typedef struct bst_error_budget_source {
     float peak_e;      /* largest light in one pixel */
     float nodes_e;     /* bound of the error by nodes, profiles and rounding, e- */
     float predicted_e; /* predicted value of that error */
+    float grid_e;      /* the part of it that may lie at any distance */
     float shared_e;    /* error by a shared track */
     float excess_e;    /* light from beyond the stamp, added to it */
     float border_e;    /* light missing next to the stamp */
@@ -69,5 +70,15 @@ double bst_error_budget_bound_sigma(bst_error_budget *budget);
 
 /* Predicted error in any pixel, as bst_error_budget_bound_sigma. */
 double bst_error_budget_error_sigma(bst_error_budget *budget);
+/* The same if the nodes' errors in any pixel are known to be at most `nodes_sigma`. */
+double bst_error_budget_limited_sigma(bst_error_budget *budget, double nodes_sigma);
+
+/* Share of the other sources' errors that adds where the worst source's error is largest. */
+#define BST_ERROR_REST 0.4
+
+/* The frame's sources so far, in the order in which they were added; valid until the next one. */
+const bst_error_budget_source *bst_error_budget_sources(const bst_error_budget *budget, int *count);
+/* The frame's motion, with `overlap`. */
+const bst_error_budget_motion *bst_error_budget_frame_motion(const bst_error_budget *budget);
 
 #endif

@@ -98,7 +98,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_scene_sour
 typedef struct bst_smear_result {
     bool known, visible, leaves;
     bst_kernel_source_record record;
-    double peak_e, read_e, presence, widening_px2;
+    double peak_e, read_e, presence, gap_px, widening_px2;
     bst_error_budget_source error;
 } bst_smear_result;
 
@@ -124,6 +124,8 @@ double bst_smear_last_peak_e(const bst_smear *smear);
 double bst_smear_last_read_e(const bst_smear *smear);
 /* Share of that source's errors that reaches the window: 1 unless it stays beside it. */
 double bst_smear_last_presence(const bst_smear *smear);
+/* Distance of that source from the window, px, if the share is below 1. */
+double bst_smear_last_gap_px(const bst_smear *smear);
 /* Largest mean widening of that source's nodes at one place, px^2. */
 double bst_smear_last_widening_px2(const bst_smear *smear);
 /* True if that source may at times be further from the window than margin_px. */

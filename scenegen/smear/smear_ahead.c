@@ -213,6 +213,7 @@ static void plan_some(void *user, int begin, int end) {
         r->peak_e = own.last_peak_e;
         r->read_e = own.last_read_e;
         r->presence = own.last_presence;
+        r->gap_px = own.last_gap_px;
         r->widening_px2 = own.last_widening_px2;
         r->error = own.last_error;
     }
@@ -243,6 +244,7 @@ void bst_smear_recall(bst_smear *s, const bst_smear_result *result, bst_kernel_s
     s->last_peak_e = result->peak_e;
     s->last_read_e = result->read_e;
     s->last_presence = result->presence;
+    s->last_gap_px = result->gap_px;
     s->last_widening_px2 = result->widening_px2;
     s->last_error = result->error;
     *visible = result->visible;

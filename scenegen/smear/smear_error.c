@@ -106,13 +106,40 @@ bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) {
     return BST_OK;
 }
 
-/* Part of the predicted error of a source's nodes that is not of their missed highest moments. */
-static double higher_part(const bst_smear *s, const bst_smear_drawn *d) {
-    double square = d->scale * d->scale;
+/* Curve of the errors beside the peak of a pattern along direction d. */
+static const bst_flank_curve *curve_of(const bst_psf_sensitivity *of, int flank, int pattern,
+                                       int d) {
+    if (pattern < BST_PATTERN_GROUP) {
+        return flank == BST_FLANK_STREAK ? &of->row_flank[d][pattern - BST_PATTERN_ROW]
+                                         : &of->any_flank[flank];
+    }
+    int step = (pattern - BST_PATTERN_GROUP) / 2, order = (pattern - BST_PATTERN_GROUP) % 2;
+    return flank == BST_FLANK_STREAK && step > 0 ? &of->smooth_flank[d][step - 1][order]
+                                                 : &of->flank[flank][d][1 + order];
+}
+
+/* Error beside the peak by the patterns of a source's nodes, as flank_of. */
+static double pattern_flank(const bst_smear *s, const bst_smear_drawn *drawn, int flank,
+                            bst_flank_place place) {
+    const bst_smear_level *level = drawn->level;
+    double square = drawn->scale * drawn->scale;
     int k = BST_NODE_SCALES - 2;
     for (; k > 0 && square < 1.0; k--, square *= 2.0) {
     }
-    return s->sensitivity ? d->level->higher_part[k] : 1.0;
+    double any = bst_flank_curve_value(&s->flanks[flank], place), higher = level->higher_part[k],
+           most = higher * any;
+    for (int p = 0; p < BST_PATTERNS; p++) {
+        double part = fmax(level->missed_part[k][p], level->missed_part[k + 1][p]), beside = 0.0;
+        for (int d = 0; d < BST_NODE_DIRECTIONS && part > 0.0; d++) {
+            if (level->directions >> d & 1U) {
+                const bst_flank_curve *curve = curve_of(s->sensitivity, flank, p, d);
+                beside = fmax(beside, bst_flank_curve_value(curve, place));
+            }
+        }
+        most = fmax(most, higher * any + fmin(part, 1.0 - higher) * beside);
+        most = fmax(most, part * beside);
+    }
+    return most;
 }
 
 /* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
@@ -125,12 +152,8 @@ static double flank_of(const bst_smear *s, const bst_smear_drawn *d, double boun
     bool moves = wide * wide + high * high >= streak * streak && !d->level->rests;
     int f = moves ? BST_FLANK_STREAK : BST_FLANK_POINT;
     double light = s->last_read_e / s->dark_variance_e2;
-    double any = bst_flank_curve_at(&s->flanks[f], light), part = higher_part(s, d);
-    if (!s->sensitivity) {
-        return fmax(any, bound);
-    }
-    return part < 1.0 ? part * any + (1.0 - part) * bst_flank_curve_at(&d->level->flank[f], light)
-                      : any;
+    return s->sensitivity ? pattern_flank(s, d, f, bst_flank_place_of(light))
+                          : fmax(bst_flank_curve_at(&s->flanks[f], light), bound);
 }
 
 /* The same of the error of profiles, which widens a point along x and y: by the steps of the grid's
@@ -213,6 +236,7 @@ void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
         return;
     }
     s->last_presence = presence;
+    s->last_gap_px = gap;
     e->nodes_e *= (float)presence;
     e->predicted_e *= (float)presence;
     e->shared_e *= (float)presence;
@@ -220,4 +244,8 @@ void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
     if (gaussian && gap > d->radius + 2.0) {
         e->excess_e = 0.0f;
     }
+}
+
+double bst_smear_last_gap_px(const bst_smear *s) {
+    return s->last_gap_px;
 }

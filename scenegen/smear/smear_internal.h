@@ -26,13 +26,14 @@ typedef struct bst_smear_level {
      * bst_smear_nodes_error, their bound and what is predicted, and of profiles */
     double error[BST_NODE_SCALES], predicted[BST_NODE_SCALES];
     double profile_error, predicted_profile;
-    /* part of the nodes' predicted error, at each motion scale and all larger ones, whose pattern
-     * in the image is not that of the curves */
-    double higher_part[BST_NODE_SCALES];
-    bst_flank_curve flank[BST_FLANKS]; /* with the PSF's sensitivity */
-    bool rests;                        /* as of bst_smear_node_list */
-    bool alike;                        /* predicted errors are the bounds: all groups are short */
-    double widening_px2;               /* largest mean widening of the nodes at one place */
+    /* part of the nodes' predicted error, at each motion scale and all larger ones, that is not of
+     * missed highest moments, and parts of these by pattern; `directions` as of
+     * bst_smear_node_list */
+    double higher_part[BST_NODE_SCALES], missed_part[BST_NODE_SCALES][BST_PATTERNS];
+    unsigned directions;
+    bool rests;          /* as of bst_smear_node_list */
+    bool alike;          /* predicted errors are the bounds: all groups are short */
+    double widening_px2; /* largest mean widening of the nodes at one place */
 } bst_smear_level;
 
 /* A level computed ahead of its first use, on another thread. */
@@ -86,7 +87,7 @@ struct bst_smear {
     bool single;         /* the stars share one track */
     double spread_px;    /* largest deviation of corner stars from a shared track */
     double travel_px;    /* largest distance of a node from its source's position */
-    double last_peak_e, last_read_e, last_presence, last_widening_px2;
+    double last_peak_e, last_read_e, last_presence, last_gap_px, last_widening_px2;
     bool last_leaves;
     double chord_error; /* error of the latest source's chord approximation, relative to its peak */
     double body_sigma;  /* of the latest body's image but for its nodes, in sigma of the worst

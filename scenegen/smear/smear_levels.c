@@ -32,7 +32,7 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path
         double more = s->wide_field - 1.0, distorted = bst_camera_distorted(&s->camera) ? 2.0 : 0.0;
         aim.direction_part = s->sensitivity->part;
         aim.smooth_part = s->sensitivity->smooth;
-        aim.row_part = s->sensitivity->row;
+        aim.row_ripple = s->sensitivity->row;
         aim.most_per_px = s->sensitivity->most_per_px;
         aim.light_part = s->sensitivity->light;
         aim.turns = turns;
@@ -106,20 +106,18 @@ static int blocks_of(const bst_smear_node_list *list) {
     return (list->count + BST_BLOCK - 1) / BST_BLOCK;
 }
 
-/* Sets where in the image the nodes' errors are. */
-static void set_flanks(const bst_smear *s, const bst_smear_node_list *list, bst_smear_level *out) {
+/* Sets of which patterns in the image the nodes' errors are. */
+static void set_patterns(const bst_smear_node_list *list, bst_smear_level *out) {
     double most = 0.0;
     for (int k = BST_NODE_SCALES - 1; k >= 0; k--) {
         double whole = out->predicted[k];
         most = fmax(most, whole > 0.0 ? fmin(list->higher[k] / whole, 1.0) : 1.0);
         out->higher_part[k] = most;
-    }
-    for (int k = 0; s->sensitivity && k < BST_FLANKS * BST_NODE_DIRECTIONS * 3; k++) {
-        int f = k / (3 * BST_NODE_DIRECTIONS), d = k / 3 % BST_NODE_DIRECTIONS, order = k % 3;
-        if ((list->directions >> d & 1U) && (list->orders >> (order + 1) & 1U)) {
-            bst_flank_curve_raise(&out->flank[f], &s->sensitivity->flank[f][d][order]);
+        for (int p = 0; p < BST_PATTERNS; p++) {
+            out->missed_part[k][p] = whole > 0.0 ? fmin(list->missed[k][p] / whole, 1.0) : 0.0;
         }
     }
+    out->directions = list->directions;
 }
 
 /* Fills whole blocks of a table with nodes, and their errors. column: fills one of
@@ -138,7 +136,9 @@ static void describe_nodes(const bst_smear *s, const bst_smear_node_list *list, 
         out->predicted[k] = part[BST_PART_PREDICTED] * list->predicted[k];
         out->alike = out->alike && out->predicted[k] == out->error[k];
     }
-    set_flanks(s, list, out);
+    if (s->sensitivity) {
+        set_patterns(list, out);
+    }
     for (int n = 0; n < out->blocks * BST_BLOCK; n++) {
         float *block = table + (size_t)(n / BST_BLOCK) * BST_TABLE_FLOATS;
         /* the last block is padded with zero-weight copies of the last node */

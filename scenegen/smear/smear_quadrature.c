@@ -205,6 +205,14 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
 #define JUMP_SPEEDS 8.0
 #define BESIDE_A_JUMP 2.4
 
+/* Pattern of the missed moment of a rule of two or three nodes, for images that move by the root of
+ * `square` of the path. */
+static int pattern_of(const bst_smear_maker *m, const bst_smear_rule *r, double square) {
+    double at = square * r->kernel * BST_SMOOTH_PER / m->variance;
+    int n = at < BST_SMOOTH_STEPS - 1 ? (int)at : BST_SMOOTH_STEPS - 1;
+    return BST_PATTERN_GROUP + 2 * n + r->nodes - 2;
+}
+
 /* Raises the list's errors to those of a rule for a group with this axis; returns its predicted
  * error. Of the missed moment's error, either bound holds: the smoothed sum of the moduli, or the
  * smoothed greatest derivative of a group, and that of a row of groups.
@@ -218,31 +226,34 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
     bst_smear_missed_parts(m, &along, r, part, one);
     double square = 1.0 / (1 << (BST_NODE_SCALES - 2)),
            jump = beside < BESIDE_A_JUMP ? 1.0 : beside;
-    bool row = false;
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
-        double fourth = square * square;
+        double fourth = square * square, alone = fmin(one[k], part[k]), many = 0.0;
+        int row = BST_PATTERN_ROW;
         double low = square * (square > 1.0 ? sqrt(square) : 1.0);
         double fixed = r->fixed * fmax(low, 1.0);
         double higher = (r->error - r->missed - r->fixed) * low;
         double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
         double bound = fixed + higher + missed;
         if (one[k] < part[k]) {
-            double many = bst_smear_row_part(m, &along, r, sqrt(square), one[k]);
-            row = row || many > one[k];
-            part[k] = fmin(many, part[k]);
+            many =
+                fmin(bst_smear_row_part(m, &along, r, sqrt(square), beside <= 1.0, &row), part[k]);
+            part[k] = fmax(many, alone);
         }
         double rest = jump * (along.second * fixed + along.higher * higher);
         part[k] *= beside;
         double predicted = rest + part[k] * missed;
         list->higher[k] = rest > list->higher[k] ? rest : list->higher[k];
+        if (m->direction_part && r->nodes > 1) {
+            double *of = list->missed[k], *alike = of + pattern_of(m, r, square);
+            *alike = fmax(*alike, beside * alone * missed);
+            of[row] = fmax(of[row], beside * many * missed);
+        }
         list->error[k] = bound > list->error[k] ? bound : list->error[k];
         list->predicted[k] = predicted > list->predicted[k] ? predicted : list->predicted[k];
     }
     for (int d = 0; d < BST_NODE_DIRECTIONS && m->direction_part; d++) {
-        list->directions |= along.in_range[d] || row ? 1U << d : 0U;
+        list->directions |= along.in_range[d] ? 1U << d : 0U;
     }
-    /* a row has a pattern of its own */
-    list->orders |= row ? 7U << 1 : r->nodes > 1 ? 1U << r->nodes : 0U;
     return jump * (along.second * r->fixed + along.higher * (r->error - r->missed - r->fixed)) +
            part[BST_NODE_SCALES - 2] * r->missed;
 }
@@ -499,7 +510,7 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .further_variance = aim->further_variance,
         .direction_part = aim->direction_part,
         .smooth_part = aim->smooth_part,
-        .row_part = aim->row_part,
+        .row_ripple = aim->row_ripple,
         .most_per_px = aim->most_per_px,
         .light_part = aim->light_part,
         .turns = aim->turns,

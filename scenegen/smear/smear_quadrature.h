@@ -32,6 +32,32 @@ typedef struct bst_smear_node {
 /* Motion scales for which the error is estimated; see bst_smear_nodes_error. */
 enum { BST_NODE_SCALES = 9 };
 
+/* Directions for which the PSF's derivatives are known: pi d / BST_NODE_DIRECTIONS from x. */
+enum { BST_NODE_DIRECTIONS = 12, BST_ROW_STEPS = 32 };
+
+/* Smoothing for which its derivatives are known: variances of n / BST_SMOOTH_PER of that of the
+ * Gaussian, along the direction. */
+enum { BST_SMOOTH_STEPS = 5, BST_SMOOTH_PER = 10 };
+
+/* Lengths of the groups of a row, in sigma of the Gaussian, that are kept apart. */
+enum { BST_ROW_LENGTHS = 8 };
+static inline int bst_row_length(double sigmas) {
+    static const double upto[BST_ROW_LENGTHS - 1] = {1.9, 2.15, 2.4, 2.7, 3.1, 3.7, 4.5};
+    int n = 0;
+    while (n < BST_ROW_LENGTHS - 1 && sigmas >= upto[n]) {
+        n++;
+    }
+    return n;
+}
+
+/* Patterns of missed highest moments in the image: a row of equal groups, and the derivatives of
+ * order 4 and 6 of a group, smoothed by at least n of those steps. */
+enum {
+    BST_PATTERN_ROW,                                       /* + bst_row_length */
+    BST_PATTERN_GROUP = BST_PATTERN_ROW + BST_ROW_LENGTHS, /* + 2 n, + 1 for order 6 */
+    BST_PATTERNS = BST_PATTERN_GROUP + 2 * BST_SMOOTH_STEPS
+};
+
 /* Growing array of nodes: zero-initialise, free `items`. bst_smear_nodes_clear allows reuse. */
 typedef struct bst_smear_node_list {
     bst_smear_node *items;
@@ -43,23 +69,16 @@ typedef struct bst_smear_node_list {
     /* the same of the predicted error: at most the bound, which takes the greatest derivative of
      * the PSF for the whole length of a group */
     double predicted[BST_NODE_SCALES];
-    /* what is predicted without the missed highest moments, which are derivatives of the image of
-     * order 2 n along the groups: bits n of `orders`, d of `directions`; both 0 if the PSF's
-     * derivatives are not known by direction */
-    double higher[BST_NODE_SCALES];
-    unsigned orders, directions;
+    /* what is predicted without the missed highest moments, and those by their pattern in the
+     * image; bits d of `directions` along which they are, 0 if the PSF's derivatives are not known
+     * by direction */
+    double higher[BST_NODE_SCALES], missed[BST_NODE_SCALES][BST_PATTERNS];
+    unsigned directions;
     bool rests; /* a path of the nodes rests somewhere (bst_motion_rests) */
 } bst_smear_node_list;
 
 /* Largest widening of a node, PSF variances. */
 #define BST_NODE_WIDEST 1.0
-
-/* Directions for which the PSF's derivatives are known: pi d / BST_NODE_DIRECTIONS from x. */
-enum { BST_NODE_DIRECTIONS = 12, BST_ROW_STEPS = 32 };
-
-/* Smoothing for which its derivatives are known: variances of n / BST_SMOOTH_PER of that of the
- * Gaussian, along the direction. */
-enum { BST_SMOOTH_STEPS = 5, BST_SMOOTH_PER = 10 };
 
 /* Distances from a PSF's peak for which its light is known: BST_LIGHT_STEPS of 1 / BST_LIGHT_PER
  * sigma. */
@@ -88,8 +107,8 @@ typedef struct bst_smear_node_aim {
     const double (*direction_part)[3]; /* [BST_NODE_DIRECTIONS] */
     /* with it, of order 4 and 6 with smoothing; NULL: as a Gaussian loses by it */
     const double (*smooth_part)[BST_SMOOTH_STEPS][2]; /* [BST_NODE_DIRECTIONS] */
-    /* with it, along a row of equal groups: order 4 and 6 by groups per px, up to most_per_px */
-    const double (*row_part)[BST_ROW_STEPS][2]; /* [BST_NODE_DIRECTIONS] */
+    /* with it, ripple of a row of equal groups by groups per px, up to most_per_px */
+    const double (*row_ripple)[BST_ROW_STEPS]; /* [BST_NODE_DIRECTIONS] */
     double most_per_px;
     /* with it, least light up to a distance from the PSF's peak, over that of the peak */
     const double (*light_part)[BST_LIGHT_STEPS]; /* [BST_NODE_DIRECTIONS] */

@@ -60,7 +60,7 @@ typedef struct bst_smear_maker {
     double binned_variance, further_variance, pixel_part[3];
     const double (*direction_part)[3]; /* this and the next six as in bst_smear_node_aim */
     const double (*smooth_part)[BST_SMOOTH_STEPS][2];
-    const double (*row_part)[BST_ROW_STEPS][2];
+    const double (*row_ripple)[BST_ROW_STEPS];
     const double (*light_part)[BST_LIGHT_STEPS];
     double most_per_px;
     bool turns;
@@ -113,10 +113,10 @@ void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_direction_
  * derivatives. */
 bst_smear_direction_parts bst_smear_find_direction_parts(const bst_smear_maker *m,
                                                          const double axis[3], int nodes);
-/* The part of `missed` in a row of such groups, if the image moves by `scale` of the path. one:
- * that of a group alone, below which it is not. */
+/* The part of `missed` in a row of such groups, if the image moves by `scale` of the path; 0 if it
+ * is not known. even: it is beside groups of like speed; *pattern: which of the row's it has. */
 double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
-                          const bst_smear_rule *r, double scale, double one);
+                          const bst_smear_rule *r, double scale, bool even, int *pattern);
 
 /* Replaces *best by the rule with the fewest nodes that meets the tolerance, otherwise by the best
  * of three nodes. Rules with an error beyond `limit` are ignored. */

@@ -289,16 +289,20 @@ static void errors_by_brightness(void **state) {
     const double peak = 1e5, dark = 100.0;
     bst_fourier_point all = {.peak_e = peak, .dark_variance_e2 = dark, .widening_px2 = 0.3};
     bst_fourier_point wings = all;
-    wings.wings = true;
+    wings.gap_px = 2.5 * BST_FAR_STEP_PX;
+    e.far[1] = 2e-3;
+    e.far[2] = 3e-4;
+    e.far[BST_FAR_STEPS - 1] = 2e-5;
     double class0 = 100.0 / sqrt(0.5 * peak + dark), class8 = 40.0 / sqrt(peak / 512.0 + dark);
     double last = 10.0 / sqrt(dark);
     bst_assert_close(bst_fourier_error_sigma(&e, &all), class8, 1e-12);
-    bst_assert_close(bst_fourier_error_sigma(&e, &wings), class8, 1e-12);
+    bst_assert_close(bst_fourier_error_sigma(&e, &wings), 3.0 * last, 1e-12);
+    wings.gap_px = 1e3;
+    bst_assert_close(bst_fourier_error_sigma(&e, &wings), 0.2 * last, 1e-12);
     e.most[8] = 0.0;
     bst_assert_close(bst_fourier_error_sigma(&e, &all), fmax(class0, last), 1e-12);
     e.most[0] = 4e-3;
     bst_assert_close(bst_fourier_error_sigma(&e, &all), 4.0 * class0, 1e-12);
-    bst_assert_close(bst_fourier_error_sigma(&e, &wings), last, 1e-12);
     /* in proportion to the widening, in the same pixel */
     e.widened[0] = 6e-3;
     e.widest_px2 = 0.9;

@@ -1,0 +1,113 @@
+/* Predicted errors by where paths meet, against those of the budget, which knows boxes only. Paths
+ * are an arc of a quarter turn; no device. */
+#include "scenegen/smear/error_meeting.h"
+#include "tests/test_support.h"
+
+enum { SOURCES = 3, BLOCKS = 2, NODES = BLOCKS * BST_BLOCK };
+static const double DARK_E = 10.0, SIGMA_PX = 1.0, RADIUS_PX = 40.0;
+
+typedef struct fixture {
+    bst_ctx ctx;
+    bst_error_budget *budget;
+    float table[BLOCKS * BST_TABLE_ROWS * BST_BLOCK];
+    bst_kernel_source_record sources[SOURCES];
+    bst_error_meeting_paths paths;
+} fixture;
+
+/* Nodes of a camera that rolls by a quarter about a point: x' = x cos - y sin. */
+static int setup(void **state) {
+    fixture *f = calloc(1, sizeof *f);
+    assert_non_null(f);
+    bst_assert_ok(&f->ctx, bst_error_budget_create(&f->ctx, &f->budget));
+    for (int n = 0; n < NODES; n++) {
+        double angle = 1.5707963267948966 * n / (NODES - 1);
+        float *t = f->table + n / BST_BLOCK * BST_TABLE_ROWS * BST_BLOCK + n % BST_BLOCK;
+        const double rows[9] = {
+            cos(angle) - 1.0, -sin(angle), 0.0, sin(angle), cos(angle) - 1.0, 0.0, 0.0, 0.0, 1.0};
+        for (int i = 0; i < 9; i++) {
+            t[i * BST_BLOCK] = (float)rows[i];
+        }
+    }
+    const bst_error_budget_motion motion = {.direction = {1.0, 0.0},
+                                            .length_px = 60.0,
+                                            .width_px = 60.0,
+                                            .way_px = 63.0,
+                                            .sigma_px = SIGMA_PX,
+                                            .dark_variance_e2 = DARK_E * DARK_E};
+    bst_error_budget_begin(f->budget, &motion);
+    f->paths = (bst_error_meeting_paths){.sources = f->sources, .table = f->table, .binning = 1};
+    *state = f;
+    return 0;
+}
+
+static int teardown(void **state) {
+    fixture *f = *state;
+    bst_error_budget_free(f->budget);
+    free(f);
+    return 0;
+}
+
+/* A source at a distance from the pole; errors in units of the dark noise. */
+static void add(fixture *f, int i, double radius_px, double predicted, double grid) {
+    const bst_error_budget_source s = {.x_px = (float)radius_px,
+                                       .nodes_e = (float)(DARK_E * predicted),
+                                       .predicted_e = (float)(DARK_E * predicted),
+                                       .grid_e = (float)(DARK_E * grid)};
+    f->sources[i] = (bst_kernel_source_record){.x_px = s.x_px, .blocks = BLOCKS};
+    bst_assert_ok(&f->ctx, bst_error_budget_add(&f->ctx, f->budget, &s));
+}
+
+/* Arcs about one centre do not meet if they are further apart than errors reach. */
+static void arcs_side_by_side_do_not_add(void **state) {
+    fixture *f = *state;
+    add(f, 0, RADIUS_PX, 0.5, 0.0);
+    add(f, 1, RADIUS_PX + 12.0, 0.4, 0.0);
+    f->paths.gaussian = true;
+    bst_assert_close(bst_error_budget_error_sigma(f->budget), 0.5 + 0.4 * 0.4, 1e-6);
+    /* a tenth of the other's at 3 sigma, less by the sixth power */
+    double far = 0.1 * pow(3.0 / (12.0 - 1.8), 6.0) * 0.4;
+    bst_assert_close(bst_error_meeting_sigma(f->budget, &f->paths), 0.5 + far, 1e-4);
+    f->paths.gaussian = false;
+    far = 0.3 * pow(3.0 / (12.0 - 1.8), 3.0) * 0.4;
+    bst_assert_close(bst_error_meeting_sigma(f->budget, &f->paths), 0.5 + far, 1e-4);
+}
+
+static void near_arcs_add(void **state) {
+    fixture *f = *state;
+    add(f, 0, RADIUS_PX, 0.5, 0.0);
+    add(f, 1, RADIUS_PX + 3.0, 0.4, 0.0);
+    add(f, 2, RADIUS_PX + 30.0, 0.1, 0.0);
+    double all = bst_error_budget_error_sigma(f->budget);
+    double meeting = bst_error_meeting_sigma(f->budget, &f->paths);
+    bst_assert_close(meeting, 0.5 + 0.4 * 0.4, 1e-3);
+    assert_true(meeting <= all);
+}
+
+/* Errors of the grid lie at any distance. */
+static void grid_errors_add_anywhere(void **state) {
+    fixture *f = *state;
+    add(f, 0, RADIUS_PX, 0.5, 0.0);
+    add(f, 1, RADIUS_PX + 30.0, 0.4, 0.3);
+    f->paths.gaussian = true;
+    bst_assert_close(bst_error_meeting_sigma(f->budget, &f->paths), 0.5 + 0.4 * 0.3, 1e-3);
+}
+
+/* Near a node behind the camera nothing is known. */
+static void a_node_behind_the_camera_meets_all(void **state) {
+    fixture *f = *state;
+    add(f, 0, RADIUS_PX, 0.5, 0.0);
+    add(f, 1, RADIUS_PX + 30.0, 0.4, 0.0);
+    f->table[8 * BST_BLOCK] = -1.0f;
+    bst_assert_close(bst_error_meeting_sigma(f->budget, &f->paths),
+                     bst_error_budget_error_sigma(f->budget), 1e-6);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(arcs_side_by_side_do_not_add, setup, teardown),
+        cmocka_unit_test_setup_teardown(near_arcs_add, setup, teardown),
+        cmocka_unit_test_setup_teardown(grid_errors_add_anywhere, setup, teardown),
+        cmocka_unit_test_setup_teardown(a_node_behind_the_camera_meets_all, setup, teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
