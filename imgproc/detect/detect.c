@@ -63,6 +63,8 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     ip->locator.max_fits = (int)ip->config.max_fits;
     ip->locator.false_splits = ip->config.false_splits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
+    BST_TRY(bst_streak_fragments_create(ctx, hypot(fwhm / BST_FWHM_PER_SIGMA, ip->config.jitter_px),
+                                        &ip->fragments));
     BST_TRY(bst_imgproc_open_silhouettes(ctx, ip));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, &streaks, &ip->streaks)
@@ -119,6 +121,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_imgproc_locator_free(&ip->locator);
     bst_streak_motion_free(&ip->streak_motion);
     bst_streak_locator_free(&ip->streaks);
+    bst_streak_fragments_free(&ip->fragments);
     bst_parallel_free(ip->pool);
     bst_known_psf_free(ip->known);
     bst_pixel_shows_free(&ip->shows);
@@ -431,6 +434,9 @@ static void locate_candidates(bst_imgproc *ip, const part *p, bst_detections *ou
         bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, p->false_alarms, &ip->locator);
     }
     bst_locate_join_streaks(&ip->locator, &ip->view);
+    if (!ip->smeared) {
+        bst_streak_fragments_join(&ip->fragments, &ip->view, &ip->locator);
+    }
     for (int i = 0; i < ip->locator.count; i++) {
         if (ip->locator.found[i].dropped) {
             continue;

@@ -9,6 +9,7 @@
 #include "imgproc/extended/silhouette.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/measure/locate.h"
+#include "imgproc/streak/streak_fragments.h"
 #include "imgproc/streak/streak_locate.h"
 #include "imgproc/streak/streak_motion.h"
 
@@ -26,6 +27,7 @@ struct bst_imgproc {
     bst_imgproc_locator locator;
     bst_streak_motion streak_motion;
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
+    bst_streak_fragments fragments;
     bst_parallel *pool;
     int *order, *order_swap, *row;
     uint16_t *cropped; /* pixels of a cropped window */

@@ -28,6 +28,7 @@ typedef struct bst_imgproc_found {
     unsigned flags;  /* BST_DETECTION_... */
     bool streak;     /* the fitted shape is not a point */
     bool own_streak; /* a point that was fitted again as a streak */
+    bool joined;     /* put together from fragments: streak_fragments.h */
     bool dropped;
     bool bleed;               /* its charge blooms along columns: blooming.h */
     double bleed_e, bleed_px; /* with bleed: total charge, and width of the saturated columns */
