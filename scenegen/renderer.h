@@ -146,7 +146,7 @@ long long bst_renderer_saturated_frames(const bst_renderer *renderer);
 
 /* Statistics of the latest rendering. The first call after a request takes 0.1 us per source for
  * the predicted error. */
-void bst_renderer_get_stats(const bst_renderer *renderer, bst_render_stats *out);
+void bst_renderer_get_stats(bst_renderer *renderer, bst_render_stats *out);
 
 /* Expected electrons of source `index` of the latest request in its brightest pixel, without
  * background. */

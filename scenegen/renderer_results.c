@@ -39,7 +39,7 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
     return r->saturation.frames;
 }
 
-void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
+void bst_renderer_get_stats(bst_renderer *r, bst_render_stats *out) {
     *out = r->stats;
     if (!r->summed) {
         out->predicted_sigma = bst_scene_plan_error_sigma(&r->plan, r->smear, r->budget);

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "scenegen/smear/error_meeting.h"
 #include "scenegen/source_order.h"
 #include "sim/world/scene/skylight.h"
 
@@ -16,6 +15,7 @@ void bst_scene_plan_clear(bst_scene_plan *p) {
     free(p->results);
     free(p->shares);
     free(p->peak_e);
+    bst_error_meeting_free(p->meeting);
     *p = (bst_scene_plan){.count = 0};
 }
 
@@ -290,7 +290,7 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
     return BST_OK;
 }
 
-double bst_scene_plan_error_sigma(const bst_scene_plan *p, const bst_smear *smear,
+double bst_scene_plan_error_sigma(bst_scene_plan *p, const bst_smear *smear,
                                   bst_error_budget *budget) {
     assert(p && smear && budget);
     if (p->distorted) { /* the table's places are without distortion */
@@ -301,5 +301,5 @@ double bst_scene_plan_error_sigma(const bst_scene_plan *p, const bst_smear *smea
                                            .table = bst_smear_table(smear, &blocks),
                                            .binning = p->binning,
                                            .gaussian = p->gaussian};
-    return bst_error_meeting_sigma(budget, &paths);
+    return bst_error_meeting_sigma(&p->meeting, budget, &paths);
 }

@@ -6,6 +6,7 @@
 #include "scenegen/fourier/fourier_render.h"
 #include "scenegen/renderer.h"
 #include "scenegen/smear/error_budget.h"
+#include "scenegen/smear/error_meeting.h"
 #include "scenegen/smear/smear.h"
 
 typedef struct bst_scene_plan {
@@ -20,6 +21,7 @@ typedef struct bst_scene_plan {
     double *peak_e; /* of all sources of the request: most expected electrons in one pixel */
     bst_kernel_source_record *list; /* [count] the same in the order of the request */
     bst_smear_result *results;      /* work space, if the smear has threads */
+    bst_error_meeting *meeting;     /* work space of the predicted error */
     int capacity;
     int binning;
     bool gaussian, distorted; /* the PSF; the camera */
@@ -51,7 +53,7 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_cam
 /* Predicted error of the latest request in any pixel, in its sigma; at most that of the budget.
  *
  * Given:     smear, budget  as they are after its planning */
-double bst_scene_plan_error_sigma(const bst_scene_plan *plan, const bst_smear *smear,
+double bst_scene_plan_error_sigma(bst_scene_plan *plan, const bst_smear *smear,
                                   bst_error_budget *budget);
 
 /* Frees the memory of a plan. */

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 /* More sources, or blocks of nodes, are left to the budget. */
-enum { MOST_SOURCES = 64, MOST_BLOCKS = 2048 };
+enum { MOST_SOURCES = 64, MOST_BLOCKS = 2048, LEAST_BLOCKS = 128 };
 
 /* Distance of two images, in sigma, up to which their errors meet, besides a read-out pixel: as in
  * the budget's boxes. Nodes are up to SPACING sigma from the path between them. */
@@ -16,7 +16,8 @@ typedef struct node_box {
     float low[2], high[2];
 } node_box;
 
-typedef struct meeting {
+struct bst_error_meeting {
+    int capacity; /* blocks for which there is memory */
     const bst_error_budget_source *sources;
     bst_error_meeting_paths paths;
     bst_error_budget_motion motion;
@@ -26,7 +27,9 @@ typedef struct meeting {
     node_box *boxes;         /* [blocks] */
     double error[MOST_SOURCES], noise_e[MOST_SOURCES], sigma_px[MOST_SOURCES];
     float gap_px[MOST_SOURCES][MOST_SOURCES]; /* negative: not known yet */
-} meeting;
+};
+
+typedef struct bst_error_meeting meeting;
 
 /* Positions of a block's nodes, by the homographies of the table (smear_levels.c), and their box.
  * A node behind the camera makes the box endless. Returns the largest widening, PSF variances. */
@@ -160,6 +163,34 @@ static double greatest_error(meeting *m) {
     return worst;
 }
 
+static void free_room(meeting *m) {
+    free(m->x);
+    free(m->y);
+    free(m->boxes);
+    m->x = m->y = NULL;
+    m->boxes = NULL;
+    m->capacity = 0;
+}
+
+/* Memory for the blocks; it grows by half at least. */
+static bool make_room(meeting *m) {
+    if (m->blocks <= m->capacity) {
+        return true;
+    }
+    const int wanted = m->blocks > m->capacity * 3 / 2 ? m->blocks : m->capacity * 3 / 2;
+    const size_t blocks = (size_t)(wanted > LEAST_BLOCKS ? wanted : LEAST_BLOCKS);
+    free_room(m);
+    m->x = malloc(blocks * BST_BLOCK * sizeof *m->x);
+    m->y = malloc(blocks * BST_BLOCK * sizeof *m->y);
+    m->boxes = malloc(blocks * sizeof *m->boxes);
+    if (!m->x || !m->y || !m->boxes) {
+        free_room(m);
+        return false;
+    }
+    m->capacity = (int)blocks;
+    return true;
+}
+
 static bool make_paths(meeting *m) {
     m->blocks = 0;
     for (int i = 0; i < m->count; i++) {
@@ -169,11 +200,7 @@ static bool make_paths(meeting *m) {
             return false;
         }
     }
-    size_t nodes = (size_t)m->blocks * BST_BLOCK;
-    m->x = malloc(nodes * sizeof *m->x);
-    m->y = malloc(nodes * sizeof *m->y);
-    m->boxes = malloc((size_t)m->blocks * sizeof *m->boxes);
-    if (!m->x || !m->y || !m->boxes) { /* only an improvement */
+    if (!make_room(m)) { /* only an improvement */
         return false;
     }
     double dark = m->motion.dark_variance_e2;
@@ -197,24 +224,30 @@ static bool make_paths(meeting *m) {
     return true;
 }
 
-double bst_error_meeting_sigma(bst_error_budget *budget, const bst_error_meeting_paths *paths) {
-    assert(budget && paths);
+void bst_error_meeting_free(bst_error_meeting *m) {
+    if (m) {
+        free_room(m);
+        free(m);
+    }
+}
+
+double bst_error_meeting_sigma(bst_error_meeting **space, bst_error_budget *budget,
+                               const bst_error_meeting_paths *paths) {
+    assert(space && budget && paths);
     double nodes = INFINITY;
     int count;
     const bst_error_budget_source *sources = bst_error_budget_sources(budget, &count);
-    meeting *m = count > 1 && count <= MOST_SOURCES ? malloc(sizeof *m) : NULL;
-    if (m) {
+    const bool few = count > 1 && count <= MOST_SOURCES;
+    if (few && !*space) {
+        *space = calloc(1, sizeof **space);
+    }
+    if (few && *space) {
+        meeting *m = *space;
         m->sources = sources;
         m->count = count;
         m->paths = *paths;
         m->motion = *bst_error_budget_frame_motion(budget);
-        m->x = m->y = NULL;
-        m->boxes = NULL;
         nodes = make_paths(m) ? greatest_error(m) : INFINITY;
-        free(m->x);
-        free(m->y);
-        free(m->boxes);
-        free(m);
     }
     return bst_error_budget_limited_sigma(budget, nodes);
 }

@@ -17,7 +17,15 @@ typedef struct bst_error_meeting_paths {
     bool gaussian; /* the PSF, whose errors fall faster than those of others */
 } bst_error_meeting_paths;
 
-/* Predicted error in any pixel: at most that of the budget, which it is with many sources. */
-double bst_error_meeting_sigma(bst_error_budget *budget, const bst_error_meeting_paths *paths);
+/* Work space of a renderer. */
+typedef struct bst_error_meeting bst_error_meeting;
+
+/* Predicted error in any pixel: at most that of the budget, which it is with many sources.
+ *
+ * Given:     *space  NULL before the first call; it grows with the frames
+ * Ownership: free *space with bst_error_meeting_free */
+double bst_error_meeting_sigma(bst_error_meeting **space, bst_error_budget *budget,
+                               const bst_error_meeting_paths *paths);
+void bst_error_meeting_free(bst_error_meeting *space); /* NULL allowed */
 
 #endif
