@@ -104,8 +104,7 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
         return bst_control_start_search(ctx, c, BST_MODE_REACQUIRE, tick,
                                         "the tracker has lost the target");
     }
-    if (!track) { /* it may flash: it may come back, as a new track, in the time that it was given
-                   */
+    if (!track) { /* it may flash, and come back as a new track in the time that it was given */
         BST_TRY(bst_control_best_candidate(ctx, c, tracks, &track));
     }
     if (!track) {

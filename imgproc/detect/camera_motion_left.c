@@ -1,16 +1,14 @@
 /* The camera's motion in a frame: corrected by star streaks, and what remains unknown of it. */
 #include "imgproc/detect/detect_internal.h"
 
-/* RMS bend, px, of the stars' path per px RMS of jitter whose spectrum is flat from 2.5 to 100
- * cycles per exposure. */
-static const double JITTER_BEND = 0.075;
 /* Drift of the camera unknown to the telemetry, px per exposure. */
 static const double DRIFT_PX = 1.0;
 
 /* 1 sigma per axis of the bend before it is measured on streaks, sensor px. */
 static double unknown_bend_px(const bst_imgproc *ip, const bst_camera_motion *motion) {
-    return hypot(hypot(JITTER_BEND * ip->config.jitter_px, ip->config.motion_bend_px),
-                 motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
+    return bst_camera_motion_unknown_bend_px(
+        ip->config.jitter_px, ip->config.motion_bend_px,
+        motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
 }
 
 void bst_imgproc_correct_motion(bst_imgproc *ip, double binning, bst_camera_motion *motion) {

@@ -74,6 +74,15 @@ void bst_camera_motion_widen(double bend_x_px, double bend_y_px, double followed
 void bst_camera_motion_add(bst_camera_motion *motion, const bst_camera *camera, double dx_px,
                            double dy_px, double bend_x_px, double bend_y_px);
 
+/* 1 sigma per axis of the bend of an exposure's path before it is measured on streaks, px: of
+ * jitter whose spectrum is flat from 2.5 to 100 cycles per exposure, of what neither it nor
+ * telemetry shows, and of the telemetry's noise.
+ *
+ * Given:     jitter_px     RMS per axis
+ *            own_px        bend that is known besides (motion_bend_px of imgproc)
+ *            telemetry_px  bend_sigma_rad, in px */
+double bst_camera_motion_unknown_bend_px(double jitter_px, double own_px, double telemetry_px);
+
 /* Variance of the displacement that all star streaks of a frame share, because the motion of the
  * camera departs from the one that is fitted.
  *

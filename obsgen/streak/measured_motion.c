@@ -2,6 +2,7 @@
  * (imgproc/streak/streak_motion.c): what it fits to all streaks of the frame. */
 #include <math.h>
 
+#include "boresight/camera_motion.h"
 #include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
 
@@ -9,9 +10,9 @@
  * that bend by a larger share of their length are not measured. */
 enum { MOST_STARS = 12 };
 static const double LEAST_SNR = 20.0, LEAST_PATH_SIGMAS = 4.0, MOST_BEND = 0.1;
-/* Errors of the telemetry that image processing expects, 1 sigma: of length and direction, px; of
- * the bend, share of the jitter (imgproc/detect/camera_motion_left.c). */
-static const double DRIFT_PX = 1.0, JITTER_BEND = 0.075;
+/* 1 sigma of the telemetry's error of length and direction that image processing expects, px
+ * (imgproc/detect/camera_motion_left.c). */
+static const double DRIFT_PX = 1.0;
 /* Random stream of the bend's error. */
 static const uint64_t BEND_ERROR = (uint64_t)1 << 55;
 
@@ -70,8 +71,9 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
     g->fit_path = g->star_path;
     g->fit_bend_x = g->bend_x;
     g->fit_bend_y = g->bend_y;
-    double own = hypot(JITTER_BEND * g->settings.jitter_px, g->settings.motion_bend_px);
-    double prior = hypot(own, f->bend_sigma_px) / g->binning;
+    double prior = bst_camera_motion_unknown_bend_px(g->settings.jitter_px,
+                                                     g->settings.motion_bend_px, f->bend_sigma_px) /
+                   g->binning;
     g->bend_before = g->bend_after = prior;
     double snr2 = snr2_of_stars(g, f->truth), length = g->streak;
     if (g->smeared || g->path.count < 3 || !(length >= LEAST_PATH_SIGMAS * g->fitted_sigma) ||

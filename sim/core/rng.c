@@ -49,16 +49,20 @@ double bst_rng_uniform(bst_rng_key key, uint64_t a, uint64_t b) {
     return open_unit(r.w[0], r.w[1]);
 }
 
-void bst_rng_normal2(bst_rng_key key, uint64_t a, uint64_t b, double out[2]) {
+/* Radius and angle of a point with two normal coordinates (Box and Muller 1958). */
+static double normal_radius(bst_rng_key key, uint64_t a, uint64_t b, double *angle) {
     bst_philox_words r = bst_rng_words(key, a, b);
-    double radius = sqrt(-2.0 * log(open_unit(r.w[0], r.w[1])));
-    double angle = 2.0 * BST_PI * open_unit(r.w[2], r.w[3]);
+    *angle = 2.0 * BST_PI * open_unit(r.w[2], r.w[3]);
+    return sqrt(-2.0 * log(open_unit(r.w[0], r.w[1])));
+}
+
+void bst_rng_normal2(bst_rng_key key, uint64_t a, uint64_t b, double out[2]) {
+    double angle, radius = normal_radius(key, a, b, &angle);
     out[0] = radius * cos(angle);
     out[1] = radius * sin(angle);
 }
 
 double bst_rng_normal(bst_rng_key key, uint64_t a, uint64_t b) {
-    bst_philox_words r = bst_rng_words(key, a, b);
-    double angle = 2.0 * BST_PI * open_unit(r.w[2], r.w[3]);
-    return sqrt(-2.0 * log(open_unit(r.w[0], r.w[1]))) * cos(angle);
+    double angle, radius = normal_radius(key, a, b, &angle);
+    return radius * cos(angle);
 }

@@ -213,6 +213,11 @@ enum { SHIFT_STEPS = 512 };
  */
 static const double LEAST_STREAK_SIGMAS = 0.5;
 
+double bst_camera_motion_unknown_bend_px(double jitter_px, double own_px, double telemetry_px) {
+    static const double JITTER_BEND = 0.075; /* RMS bend per RMS of jitter */
+    return hypot(hypot(JITTER_BEND * jitter_px, own_px), telemetry_px);
+}
+
 void bst_camera_motion_shared_shift(double length_px, double sigma_px, double before_px,
                                     double after_px, double *along_px2, double *across_px2) {
     *along_px2 = *across_px2 = 0.0;

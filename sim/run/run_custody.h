@@ -18,13 +18,12 @@ struct cJSON;
 typedef struct bst_run_custody bst_run_custody;
 
 typedef struct bst_custody_figures {
-    int64_t objects;    /* with a filter and a position at the end */
-    int64_t updated;    /* by at least one track */
-    int64_t in_custody; /* standard deviation of the position within record/custody_within_m */
-    int64_t tracks;     /* confirmed tracks with enough detections */
-    int64_t correlated; /* with an object */
-    int64_t
-        ambiguous; /* with more than one object, or with none beside the light of one: not used */
+    int64_t objects;      /* with a filter and a position at the end */
+    int64_t updated;      /* by at least one track */
+    int64_t in_custody;   /* standard deviation of the position within record/custody_within_m */
+    int64_t tracks;       /* confirmed tracks with enough detections */
+    int64_t correlated;   /* with an object */
+    int64_t ambiguous;    /* with more than one, or with none beside the light of one: not used */
     int64_t uncorrelated; /* with none, or the filter has no state there */
     int64_t unknown;      /* objects that the catalogue lacks, by record/custody_unknown_share */
     int64_t candidates, candidates_confirmed, candidates_wrong; /* bst_candidate_figures */

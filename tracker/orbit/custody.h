@@ -66,8 +66,7 @@ typedef struct bst_custody_observation {
     bst_vec3 rate_radps;     /* perpendicular to it */
     double covariance[4][4]; /* d1, d2, r1, r2 in the tangent axes at the direction, as in bst_track
                               */
-    /* factor on the standard deviation of the photocentre; 0: the phase is not known, and it is 1
-     */
+    /* factor on the standard deviation of the photocentre; 0: not known, it is taken for 1 */
     double photocentre_factor;
 } bst_custody_observation;
 
