@@ -435,7 +435,7 @@ static void locate_candidates(bst_imgproc *ip, const part *p, bst_detections *ou
     }
     bst_locate_join_streaks(&ip->locator, &ip->view);
     if (!ip->smeared) {
-        bst_streak_fragments_join(&ip->fragments, &ip->view, &ip->locator);
+        bst_streak_fragments_join(&ip->fragments, &ip->view, ip->candidates.count, &ip->locator);
     }
     for (int i = 0; i < ip->locator.count; i++) {
         if (ip->locator.found[i].dropped) {

@@ -451,13 +451,14 @@ static void join(bst_streak_fragments *j, const view *v, int i) {
     }
 }
 
-void bst_streak_fragments_join(bst_streak_fragments *j, const bst_locate_frame *f,
+void bst_streak_fragments_join(bst_streak_fragments *j, const bst_locate_frame *f, int candidates,
                                bst_imgproc_locator *l) {
     assert(j && f && l && j->capacity > 0);
     view v = {.f = f, .l = l};
     bst_streak_rays_set(&v.rays, f);
     v.sigma = v.rays.sigma_px;
-    bool crowd = l->count > FEW_SOURCES + CROWD_PER_PX * (double)f->width * (double)f->height;
+    const int sources = candidates > l->count ? candidates : l->count;
+    bool crowd = sources > FEW_SOURCES + CROWD_PER_PX * (double)f->width * (double)f->height;
     for (int i = 0; i < l->count && !crowd; i++) {
         const bst_imgproc_found *s = &l->found[i];
         if (is_light(s) && !s->rough && s->label == BST_LABEL_UNKNOWN) {

@@ -41,8 +41,9 @@ void bst_streak_fragments_free(bst_streak_fragments *fragments);
  *
  * A streak of unknown rate whose end the frame cuts has the standard deviation of half its visible
  * length along itself: the part beyond is unknown. Nothing is joined in a crowd, where stars line
- * up. A segment like the streaks of stars is none. */
+ * up: `candidates` is the number of the frame's sources before the locator's limits cut it. A
+ * segment like the streaks of stars is none. */
 void bst_streak_fragments_join(bst_streak_fragments *fragments, const bst_locate_frame *frame,
-                               bst_imgproc_locator *located);
+                               int candidates, bst_imgproc_locator *located);
 
 #endif

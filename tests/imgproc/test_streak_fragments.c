@@ -215,6 +215,45 @@ static void stars_in_a_row_stay(void **state) {
     synthetic_free(&s);
 }
 
+/* Length of the longest detection of a bright path of 200 px among stars on a grid of 21 px. */
+static double longest_in_crowd(int capacity) {
+    enum { GRID = 21 };
+    bst_ctx ctx = {0};
+    synthetic s;
+    synthetic_init(&s, SIDE, SIDE);
+    s.config.capacity = capacity;
+    s.config.streak_search_px = 0.0; /* would find the path whole */
+    bst_imgproc *ip = synthetic_processor(&ctx, &s);
+    bst_detections *d = synthetic_detections(ROOM);
+    bst_imgproc_frame frame = synthetic_frame(&s);
+    const path p = {250.0, 250.0, 0.6, 0.8, 200.0};
+    double noise = synthetic_noise(&s), longest = 0.0;
+    synthetic_clear(&s);
+    add_path(&s, &p, 200.0 * noise / norm_of(&s, p.length));
+    for (int y = GRID; y < SIDE; y += GRID) {
+        for (int x = GRID; x < SIDE; x += GRID) {
+            synthetic_add(&s, x, y, 10.0 * noise / norm_of(&s, 0.0), 0.0, 0.0);
+        }
+    }
+    synthetic_expose(&s, bst_rng_make_key(6, 0, "test", "crowd"), 0);
+    bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, NULL, d, ROOM));
+    for (int i = 0; i < d->count; i++) {
+        longest = fmax(longest, d->items[i].length_px);
+    }
+    free(d);
+    bst_imgproc_free(ip);
+    synthetic_free(&s);
+    return longest;
+}
+
+/* 576 stars are a crowd, in which nothing is joined. It remains one if the locator has room for 60
+ * of its sources, the brightest, among them those on the path. */
+static void nothing_is_joined_in_a_cut_crowd(void **state) {
+    (void)state;
+    assert_true(longest_in_crowd(ROOM) < 70.0);
+    assert_true(longest_in_crowd(60) < 70.0);
+}
+
 /* A bent segment drawn as 4,000 points on its parabola is found from a rough start, and the sum of
  * its shares is its light. */
 static void fit_of_a_segment(void **state) {
@@ -264,6 +303,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(one_detection_of_a_path),
         cmocka_unit_test(cut_paths_state_what_is_missing),
         cmocka_unit_test(stars_in_a_row_stay),
+        cmocka_unit_test(nothing_is_joined_in_a_cut_crowd),
         cmocka_unit_test(fit_of_a_segment),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
