@@ -45,6 +45,46 @@ static void solve_kepler(double u, double ax, double ay, double *sin_e, double *
     *cos_e = c;
 }
 
+/* Turn of the line of apsides by drag, for which the mean anomaly makes up, and loss of
+ * eccentricity. */
+typedef struct apsides_drag {
+    double turn, e_loss;
+} apsides_drag;
+
+/* Those of a set at time t, m its mean anomaly without drag: STR3 section 6. */
+static apsides_drag drag_of_apsides(const bst_sgp4 *s, double t, double m) {
+    if (s->short_drag) {
+        return (apsides_drag){0.0, s->e_drag * t};
+    }
+    double sin_m = sin(m), cos_m = cos(m);
+    double w = 1.0 + s->eta * cos_m;
+    double turn = s->argp_drag * t + s->m_drag * (w * w * w - s->cube_m0);
+    bst_sgp4_turn(m + turn, turn, &sin_m, &cos_m);
+    return (apsides_drag){turn, s->e_drag * t + s->e_drag_sin * (sin_m - s->sin_m0)};
+}
+
+/* Adds the displacement of the middle set's eccentricity vector by drag to that of a set near it.
+ * The steady loss in proportion to e is each set's own. */
+static void displace_as_middle(const bst_sgp4 *s, double t, bst_sgp4_mean *x) {
+    const bst_sgp4 *c = s->middle;
+    const apsides_drag drag = drag_of_apsides(c, t, c->m0 + c->m_rate * t);
+    const double e = c->e0 - drag.e_loss;
+    if (!(e >= BST_SGP4_LEAST_E)) { /* the middle set has ended */
+        x->e = e;
+        return;
+    }
+    const double e_after = fmax(e, BST_SGP4_ROUND_E);
+    const double e_before = c->e0 - (c->e_drag - c->e_drag_oblate) * t;
+    const double own = x->e - (s->e_drag - s->e_drag_oblate) * t;
+    const double before = c->argp0 + c->argp_rate * t, after = before - drag.turn;
+    const double ex = own * cos(x->argp) + (e_after * cos(after) - e_before * cos(before));
+    const double ey = own * sin(x->argp) + (e_after * sin(after) - e_before * sin(before));
+    const double turn = remainder(x->argp - atan2(ey, ex), BST_SGP4_TWO_PI);
+    x->e = hypot(ex, ey);
+    x->argp -= turn;
+    x->m += turn;
+}
+
 /* Secular gravity and drag: STR3 section 6; HSG appendix B. *a: semi-major axis. */
 static bst_sgp4_error move_mean(const bst_sgp4 *s, double t, bst_sgp4_mean *x, double *a) {
     *x = (bst_sgp4_mean){.n = s->n0,
@@ -53,21 +93,21 @@ static bst_sgp4_error move_mean(const bst_sgp4 *s, double t, bst_sgp4_mean *x, d
                          .m = s->m0 + s->m_rate * t,
                          .argp = s->argp0 + s->argp_rate * t,
                          .raan = s->raan0 + t * (s->raan_rate + t * s->raan_drag)};
-    double root_a_ratio, e_loss, l_gain;
+    double root_a_ratio, e_loss = 0.0, l_gain;
+    if (s->middle && !s->deep_space) {
+        displace_as_middle(s, t, x);
+    } else {
+        const apsides_drag drag = drag_of_apsides(s, t, x->m);
+        x->m += drag.turn;
+        x->argp -= drag.turn;
+        e_loss = drag.e_loss;
+    }
     if (s->short_drag) {
         root_a_ratio = 1.0 - s->a_drag[0] * t;
-        e_loss = s->e_drag * t;
         l_gain = s->l_drag[0] * t * t;
     } else {
-        double sin_m = sin(x->m), cos_m = cos(x->m);
-        double w = 1.0 + s->eta * cos_m;
-        double shift = s->argp_drag * t + s->m_drag * (w * w * w - s->cube_m0);
-        x->m += shift;
-        x->argp -= shift;
-        bst_sgp4_turn(x->m, shift, &sin_m, &cos_m);
         const double *ad = s->a_drag, *ld = s->l_drag;
         root_a_ratio = 1.0 - t * (ad[0] + t * (ad[1] + t * (ad[2] + t * ad[3])));
-        e_loss = s->e_drag * t + s->e_drag_sin * (sin_m - s->sin_m0);
         l_gain = t * t * (ld[0] + t * (ld[1] + t * (ld[2] + t * ld[3])));
     }
     *a = s->a0;
@@ -87,11 +127,11 @@ static bst_sgp4_error move_mean(const bst_sgp4 *s, double t, bst_sgp4_mean *x, d
     /* Summed and wrapped like the reference implementation: after years the rounding of this sum is
      * the largest error at perigee of an eccentric orbit. */
     x->m = fmod(x->m + x->argp + x->raan, BST_SGP4_TWO_PI) - x->argp - x->raan;
-    if (!(x->e < 1.0 && x->e >= -0.001)) {
+    if (!(x->e < 1.0 && x->e >= BST_SGP4_LEAST_E)) {
         return BST_SGP4_MEAN_ECCENTRICITY;
     }
-    if (x->e < 1e-6) {
-        x->e = 1e-6; /* VCHK */
+    if (x->e < BST_SGP4_ROUND_E) {
+        x->e = BST_SGP4_ROUND_E;
     }
     return BST_SGP4_OK;
 }

@@ -32,12 +32,17 @@ typedef struct bst_sgp4 bst_sgp4;
  * sidereal time and node of the operational code. */
 bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
                            bst_sgp4_mode mode, bst_sgp4 **out) BST_MUST_CHECK;
-/* The same for one of several element sets near each other, as in differences: the terms of drag
- * with 1 / e, which SGP4 leaves out up to e = 1e-4, where they jump, have e = drag_eccentricity,
- * that of the set in the middle. Where it is that of the set, this is bst_sgp4_create. */
-bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements,
-                                double drag_eccentricity, bst_sgp4_gravity gravity,
-                                bst_sgp4_mode mode, bst_sgp4 **out) BST_MUST_CHECK;
+/* The same for one of several element sets near each other, whose differences are wanted. By drag
+ * SGP4 turns the line of apsides by angles with 1 / e, and changes e by a sine of the mean anomaly;
+ * up to e = 1e-4 it leaves the first out. Together they displace the eccentricity vector by what
+ * hardly depends on e, but differs without limit between two sets near e = 0. The set moves with
+ * the displacement of the middle set in place of its own, and its drag polynomials end where those
+ * of the middle set do.
+ *
+ * Given:     middle  from bst_sgp4_create, with the gravity and mode; it must outlive *out
+ * Returned:  *out    with the elements of the middle set it has its states within rounding */
+bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements, const bst_sgp4 *middle,
+                                bst_sgp4 **out) BST_MUST_CHECK;
 /* Frees a propagator; NULL is allowed. */
 void bst_sgp4_free(bst_sgp4 *sgp4);
 

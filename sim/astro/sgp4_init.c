@@ -75,9 +75,9 @@ static void set_secular_rates(bst_sgp4 *s) {
     s->raan_drag = -3.5 * beta2 * q1 * s->plane.cos_i; /* times C1, once that is known */
 }
 
-/* Atmospheric drag in powers of time (STR3 section 6, C1 to C5 and D2 to D4). drag_e: eccentricity
- * of the terms with 1 / e. */
-static void set_drag(bst_sgp4 *s, double bstar, double drag_e) {
+/* Atmospheric drag in powers of time (STR3 section 6, C1 to C5 and D2 to D4). The polynomials end
+ * early where those of the middle set do. */
+static void set_drag(bst_sgp4 *s, double bstar) {
     const double a = s->a0, e = s->e0, n = s->n0;
     const double radius = s->k.radius_km;
     double perigee_km = (a * (1.0 - e) - 1.0) * radius;
@@ -96,19 +96,21 @@ static void set_drag(bst_sgp4 *s, double bstar, double drag_e) {
     double c1 = bstar * density * n *
                 (a * (1.0 + 1.5 * eta2 + e_eta * (4.0 + eta2)) +
                  0.375 * j2_xi * x3 * (8.0 + 3.0 * eta2 * (8.0 + eta2)));
+    double c4_oblate =
+        j2_xi / a *
+        (-3.0 * x3 * (1.0 - 2.0 * e_eta + eta2 * (1.5 - 0.5 * e_eta)) +
+         0.75 * s->plane.one_m_c2 * (2.0 * eta2 - e_eta * (1.0 + eta2)) * cos(2.0 * s->argp0));
     double c4 = 2.0 * n * density * a * beta2 *
-                (eta * (2.0 + 0.5 * eta2) + e * (0.5 + 2.0 * eta2) -
-                 j2_xi / a *
-                     (-3.0 * x3 * (1.0 - 2.0 * e_eta + eta2 * (1.5 - 0.5 * e_eta)) +
-                      0.75 * s->plane.one_m_c2 * (2.0 * eta2 - e_eta * (1.0 + eta2)) *
-                          cos(2.0 * s->argp0)));
+                (eta * (2.0 + 0.5 * eta2) + e * (0.5 + 2.0 * eta2) - c4_oblate);
     double c5 = 2.0 * density * a * beta2 * (1.0 + 2.75 * (eta2 + e_eta) + e_eta * eta2);
 
     s->raan_drag *= c1;
     s->a_drag[0] = c1;
     s->e_drag = bstar * c4;
+    s->e_drag_oblate = -bstar * 2.0 * n * density * a * beta2 * c4_oblate;
     s->l_drag[0] = n * 1.5 * c1;
-    s->short_drag = s->deep_space || a * (1.0 - e) < 220.0 / radius + 1.0;
+    const bool low = a * (1.0 - e) < 220.0 / radius + 1.0;
+    s->short_drag = s->deep_space || (s->middle ? s->middle->short_drag : low);
     if (s->short_drag) {
         return;
     }
@@ -117,10 +119,10 @@ static void set_drag(bst_sgp4 *s, double bstar, double drag_e) {
     s->sin_m0 = sin(s->m0);
     s->cube_m0 = w * w * w;
     s->e_drag_sin = bstar * c5;
-    if (drag_e > 1e-4) { /* both contain 1 / e (VCHK) */
-        double c3 = -2.0 * q_xi4 * xi * s->k.j3_over_j2 * n * s->plane.sin_i / drag_e;
+    if (e > 1e-4) { /* both contain 1 / e (VCHK) */
+        double c3 = -2.0 * q_xi4 * xi * s->k.j3_over_j2 * n * s->plane.sin_i / e;
         s->argp_drag = bstar * c3 * cos(s->argp0);
-        s->m_drag = -(2.0 / 3.0) * q_xi4 * bstar / (drag_e * (a * drag_e * xi));
+        s->m_drag = -(2.0 / 3.0) * q_xi4 * bstar / e_eta;
     }
     double d2 = 4.0 * a * xi * c1 * c1;
     double d3 = d2 * xi * c1 / 3.0 * (17.0 * a + floor_re);
@@ -144,14 +146,9 @@ static bst_status refuse(bst_ctx *ctx, const bst_elements *el, bst_sgp4_error co
                     el->mean_motion_radpmin);
 }
 
-bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
-                           bst_sgp4_mode mode, bst_sgp4 **out) {
-    return bst_sgp4_create_near(ctx, elements, elements->eccentricity, gravity, mode, out);
-}
-
-bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements,
-                                double drag_eccentricity, bst_sgp4_gravity gravity,
-                                bst_sgp4_mode mode, bst_sgp4 **out) {
+/* middle: NULL, or the set in the middle of those that are near each other */
+static bst_status create(bst_ctx *ctx, const bst_elements *elements, const bst_sgp4 *middle,
+                         bst_sgp4_gravity gravity, bst_sgp4_mode mode, bst_sgp4 **out) {
     const bst_elements *el = elements;
     *out = NULL;
     double sum = el->epoch_utc_jd1 + el->epoch_utc_jd2 + el->bstar + el->raan_rad +
@@ -173,7 +170,9 @@ bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements,
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an SGP4 propagator (%zu bytes)",
                         sizeof *s);
     }
+    s->gravity = gravity;
     s->k = make_constants(gravity);
+    s->middle = middle;
     s->afspc = mode == BST_SGP4_AFSPC;
     s->e0 = el->eccentricity;
     s->i0 = el->inclination_rad;
@@ -189,7 +188,7 @@ bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements,
     s->deep_space = BST_SGP4_TWO_PI / s->n0 >= DEEP_SPACE_PERIOD_MIN;
     bst_sgp4_set_plane(&s->k, sin(s->i0), cos_i, &s->plane);
     set_secular_rates(s);
-    set_drag(s, el->bstar, drag_eccentricity);
+    set_drag(s, el->bstar);
     if (s->deep_space) {
         /* summed to one double first, like the reference: rounding moves the Moon by 1e-10 rad,
          * 1e-6 km at the highest orbits */
@@ -206,6 +205,17 @@ bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements,
     }
     *out = s;
     return BST_OK;
+}
+
+bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
+                           bst_sgp4_mode mode, bst_sgp4 **out) {
+    return create(ctx, elements, NULL, gravity, mode, out);
+}
+
+bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements, const bst_sgp4 *middle,
+                                bst_sgp4 **out) {
+    return create(ctx, elements, middle, middle->gravity,
+                  middle->afspc ? BST_SGP4_AFSPC : BST_SGP4_IMPROVED, out);
 }
 
 void bst_sgp4_free(bst_sgp4 *sgp4) {

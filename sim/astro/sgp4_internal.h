@@ -19,6 +19,9 @@
 #define BST_SGP4_EARTH_RATE_RADPMIN 4.37526908801129966e-3
 /* below 0.2 rad the luni-solar periodics of node and perigee follow Lyddane (1963) */
 #define BST_SGP4_LYDDANE_I 0.2
+/* mean eccentricity: below the first is an error, and the second is the least (VCHK) */
+#define BST_SGP4_LEAST_E -0.001
+#define BST_SGP4_ROUND_E 1e-6
 /* Newton's method for Kepler's equation */
 #define BST_SGP4_KEPLER_STEPS 10
 #define BST_SGP4_KEPLER_LONGEST_STEP 0.95
@@ -94,6 +97,7 @@ typedef struct bst_sgp4_deep {
 } bst_sgp4_deep;
 
 struct bst_sgp4 {
+    bst_sgp4_gravity gravity;
     bst_sgp4_constants k;
     bool deep_space;
     bool short_drag; /* perigee under 220 km or deep space: drag polynomials end early */
@@ -103,11 +107,13 @@ struct bst_sgp4 {
     double raan_drag;                        /* node, times t^2 */
     double a_drag[4];                        /* sqrt(a / a0) = 1 - sum a_drag[k] t^(k+1) */
     double e_drag, e_drag_sin;               /* e = e0 - e_drag t - e_drag_sin (sin M - sin M0) */
+    double e_drag_oblate;                    /* part of e_drag that a circular orbit has: by J2 */
     double l_drag[4];                        /* mean longitude gains sum l_drag[k] t^(k+2) */
     double eta, argp_drag, m_drag;           /* STR3: eta and the rates of delta omega, delta M */
     double cube_m0, sin_m0;                  /* (1 + eta cos M0)^3, sin M0 */
     bst_sgp4_plane plane;
     bst_sgp4_deep deep;
+    const bst_sgp4 *middle; /* NULL, or the set whose displacement by drag it has, not its own */
 };
 
 /* Mean elements at one time. */

@@ -3,7 +3,8 @@
 
 #include "sim/astro/sgp4_lanes.h"
 
-/* beyond this time, min, the scalar code does a set: angles may get too large for the vectors */
+/* beyond this time, min, the scalar code does a set: angles may get too large for the vectors. It
+ * also does the sets near another one. */
 #define LONGEST_MIN 2e6
 
 typedef struct pending {
@@ -93,7 +94,7 @@ void bst_sgp4_propagate_many(const bst_sgp4 *const *sets, const double *minutes,
         }
     }
     for (int i = 0; i < count; i++) {
-        if (!(fabs(minutes[i]) <= LONGEST_MIN)) {
+        if (!(fabs(minutes[i]) <= LONGEST_MIN) || sets[i]->middle) {
             states[i].error = bst_sgp4_propagate(sets[i], minutes[i], states[i].position_teme_km,
                                                  states[i].velocity_teme_kmps);
             continue;

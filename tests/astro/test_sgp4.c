@@ -382,38 +382,67 @@ static void every_error_has_its_text(void **state) {
     }
 }
 
-/* Distance that a change of the eccentricity from 1.0001e-4 to 0.9999e-4, 0.14 m, moves an object
- * after a day, km, with the terms of drag for an eccentricity of `drag_e`. */
-static double jump_km(double drag_e) {
+/* State after `minutes` of a Starlink that falls, with the eccentricity vector (ex, ey); near: that
+ * of the set near the one with (1.5e-4, 0). */
+static void falling(double ex, double ey, bool near, double minutes, double at[3]) {
     bst_ctx ctx = {0};
-    double at[2][3], v[3];
-    for (int i = 0; i < 2; i++) {
-        const bst_elements el = {.norad = 1,
-                                 .epoch_utc_jd1 = 2459746.5,
-                                 .bstar = -0.02,
-                                 .eccentricity = i == 0 ? 1.0001e-4 : 0.9999e-4,
-                                 .inclination_rad = 0.93,
-                                 .arg_perigee_rad = 2.0,
-                                 .mean_anomaly_rad = 0.5,
-                                 .mean_motion_radpmin = 0.067};
-        bst_sgp4 *s;
-        bst_assert_ok(&ctx, bst_sgp4_create_near(&ctx, &el, drag_e > 0.0 ? drag_e : el.eccentricity,
-                                                 BST_SGP4_WGS72, BST_SGP4_IMPROVED, &s));
-        assert_int_equal(bst_sgp4_propagate(s, 1440.0, at[i], v), BST_SGP4_OK);
-        bst_sgp4_free(s);
-    }
-    return hypot(hypot(at[0][0] - at[1][0], at[0][1] - at[1][1]), at[0][2] - at[1][2]);
+    const double longitude = 2.5;
+    bst_elements el = {.norad = 1,
+                       .epoch_utc_jd1 = 2459746.5,
+                       .bstar = 0.004,
+                       .eccentricity = 1.5e-4,
+                       .inclination_rad = 0.93,
+                       .mean_anomaly_rad = longitude,
+                       .mean_motion_radpmin = 0.067};
+    bst_sgp4 *middle, *s;
+    double v[3];
+    bst_assert_ok(&ctx, bst_sgp4_create(&ctx, &el, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &middle));
+    el.eccentricity = hypot(ex, ey);
+    el.arg_perigee_rad = atan2(ey, ex);
+    el.mean_anomaly_rad = longitude - el.arg_perigee_rad;
+    bst_assert_ok(&ctx, near ? bst_sgp4_create_near(&ctx, &el, middle, &s)
+                             : bst_sgp4_create(&ctx, &el, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &s));
+    assert_int_equal(bst_sgp4_propagate(s, minutes, at, v), BST_SGP4_OK);
+    bst_sgp4_free(s);
+    bst_sgp4_free(middle);
 }
 
-/* Element sets near each other move alike if they have the terms with 1 / e of one eccentricity, on
- * either side of the 1e-4 where SGP4 drops them. */
-static void drag_near_an_eccentricity_is_smooth(void **state) {
+static double apart_km(const double a[3], const double b[3]) {
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+                (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* Sets near each other differ in proportion to the difference of their elements, also across e = 0
+ * and the 1e-4 where SGP4 drops its terms with 1 / e; the middle set is as without a middle. */
+static void sets_near_each_other_move_alike(void **state) {
     (void)state;
-    const double own = jump_km(0.0), above = jump_km(1.3e-4), below = jump_km(0.7e-4);
-    print_message("%g km, %g km, %g km\n", own, above, below);
-    assert_true(own > 0.02);
-    /* 2 a de = 0.3 m, times what drag makes of it in a day */
-    assert_true(above < 0.01 && below < 0.01);
+    enum { TURNS = 12 };
+    const double minutes[] = {45.0, 1440.0, -700.0};
+    double worst = 0.0, worst_plain = 0.0;
+    for (int k = 0; k < 3; k++) {
+        double middle[3], same[3];
+        falling(1.5e-4, 0.0, false, minutes[k], middle);
+        falling(1.5e-4, 0.0, true, minutes[k], same);
+        assert_true(apart_km(middle, same) < 1e-8);
+        for (int i = 0; i < TURNS; i++) {
+            for (int plain = 0; plain < 2; plain++) {
+                double half[3], whole[3], bend[3];
+                const double c = cos(2.0 * BST_PI * i / TURNS), q = sin(2.0 * BST_PI * i / TURNS);
+                falling(1.5e-4 + 1e-4 * c, 1e-4 * q, !plain, minutes[k], half);
+                falling(1.5e-4 + 2e-4 * c, 2e-4 * q, !plain, minutes[k], whole);
+                for (int j = 0; j < 3; j++) {
+                    bend[j] = whole[j] - 2.0 * half[j];
+                }
+                const double minus[3] = {-middle[0], -middle[1], -middle[2]};
+                double *to = plain ? &worst_plain : &worst;
+                *to = fmax(*to, apart_km(bend, minus));
+            }
+        }
+    }
+    print_message("bend %g km, of plain sets %g km\n", worst, worst_plain);
+    /* 2 a de is 2.7 km for the whole; the square of it over a is 1 m, and drag differs with e^2 */
+    assert_true(worst < 0.005);
+    assert_true(worst_plain > 0.05);
 }
 
 int main(void) {
@@ -426,7 +455,7 @@ int main(void) {
         cmocka_unit_test(refuses_what_is_no_orbit),
         cmocka_unit_test(times_out_of_reach_are_errors),
         cmocka_unit_test(every_error_has_its_text),
-        cmocka_unit_test(drag_near_an_eccentricity_is_smooth),
+        cmocka_unit_test(sets_near_each_other_move_alike),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
