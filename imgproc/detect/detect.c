@@ -63,7 +63,8 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     ip->locator.max_fits = (int)ip->config.max_fits;
     ip->locator.false_splits = ip->config.false_splits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
-    BST_TRY(bst_streak_fragments_create(ctx, hypot(fwhm / BST_FWHM_PER_SIGMA, ip->config.jitter_px),
+    BST_TRY(bst_streak_fragments_create(ctx, width, height,
+                                        hypot(fwhm / BST_FWHM_PER_SIGMA, ip->config.jitter_px),
                                         &ip->fragments));
     BST_TRY(bst_imgproc_open_silhouettes(ctx, ip));
     return ip->config.streak_search_px > 0.0
@@ -259,14 +260,14 @@ static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_img
     return BST_OK;
 }
 
-/* Adds the uncertainty of the path's bend to a streak's covariance. */
+/* Adds the uncertainty of the path's bend to a streak's covariance, unless it is measured. */
 static void add_bend_covariance(const bst_imgproc *ip, const bst_locate_frame *f,
-                                const bst_imgproc_shape *shape, bst_detection *d) {
-    if (f->motion) {
+                                const bst_imgproc_found *found, bst_detection *d) {
+    const bst_imgproc_shape *s = &found->source.shape;
+    if (f->motion && !found->joined) {
         double x, y;
         bst_camera_motion_bend(f->motion, &ip->camera, &x, &y);
-        bst_camera_motion_widen(x, y, f->binning * shape->bend_x_px, f->binning * shape->bend_y_px,
-                                d);
+        bst_camera_motion_widen(x, y, f->binning * s->bend_x_px, f->binning * s->bend_y_px, d);
     }
 }
 
@@ -290,7 +291,7 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     double rate = s->flux_e / fmax(ip->exposure_s, 1e-9);
     d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
     d.flags = found->flags;
-    add_bend_covariance(ip, f, &s->shape, &d);
+    add_bend_covariance(ip, f, found, &d);
     d.label = found->label;
     d.label_probability = found->label_probability;
     return d;

@@ -203,7 +203,7 @@ static bool set_errors(const bst_segment *s, const equations *at, int parameters
     out->flux_variance = v[FLUX][FLUX];
     out->chi_square = at->chi_square;
     out->norm = sqrt(at->square);
-    return isfinite(out->cov_xx + out->cov_yy) && out->end_variance < s->half_px * s->half_px;
+    return isfinite(out->cov_xx + out->cov_yy) && along < s->half_px * s->half_px;
 }
 
 bool bst_segment_fit_run(const bst_segment_data *data, double beyond,
@@ -255,6 +255,20 @@ void bst_segment_place(const bst_segment *s, double along_px, double *x_px, doub
     double beside = s->bend_per_px * (along_px * along_px - s->half_px * s->half_px / 3.0);
     *x_px = s->x_px + c * along_px - q * beside;
     *y_px = s->y_px + q * along_px + c * beside;
+}
+
+bst_segment bst_segment_part(const bst_segment *s, double from_px, double to_px) {
+    const double middle = 0.5 * (from_px + to_px);
+    bst_segment part = *s;
+    /* the axis follows the bend, and the mean place is beside the vertex of the part */
+    part.angle_rad += 2.0 * s->bend_per_px * middle;
+    part.half_px = 0.5 * (to_px - from_px);
+    part.flux_e *= part.half_px / s->half_px;
+    const double beside = s->bend_per_px * part.half_px * part.half_px / 3.0;
+    bst_segment_place(s, middle, &part.x_px, &part.y_px);
+    part.x_px -= beside * sin(part.angle_rad);
+    part.y_px += beside * cos(part.angle_rad);
+    return part;
 }
 
 double bst_segment_distance(const bst_segment *s, double x_px, double y_px, double *along_px) {

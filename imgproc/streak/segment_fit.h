@@ -51,16 +51,22 @@ typedef struct bst_segment_freedom {
  * Given:     segment  first estimate
  *            beyond   most that an end may move outwards, px: the pixels reach that far
  * Returned:  segment  the fit
- *            errors   inverse Fisher matrix of all parameters; along the segment the law of the
- * ends is added false, with the segment unchanged, if the pixels do not determine the parameters
+ *            errors   inverse Fisher matrix of all parameters, and along the segment the law of
+ *                     the ends
+ *            false, with the segment unchanged: the pixels do not determine the parameters, or an
+ *            end only within half of the length
  * Notes:     An end is a change of the mean of white noise. If a length l of the segment has the
  *            squared SNR l m^2, the end of greatest likelihood has the variance 26 / m^4 beside
- * that of the Fisher matrix, which holds for ends that the PSF blurs by more than 1 / m^2.
+ *            that of the Fisher matrix, which holds for ends that the PSF blurs by more than
+ *            1 / m^2
  * Reference: Yao, Ann. Statist. 15, 1321, 1987 (law of the estimated change) */
 bool bst_segment_fit_run(const bst_segment_data *data, double beyond,
                          const bst_segment_freedom *freedom, bst_segment *segment,
                          bst_segment_errors *errors);
 
+/* The part of a segment from one place along it to another, which may be beyond its ends, with the
+ * same light per length and the same bend. */
+bst_segment bst_segment_part(const bst_segment *segment, double from_px, double to_px);
 /* Place on a segment, at u px along it from its mean place. */
 void bst_segment_place(const bst_segment *segment, double along_px, double *x_px, double *y_px);
 /* Distance of a place from a segment's line, px, and its place along it from the mean place. */

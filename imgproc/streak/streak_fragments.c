@@ -18,6 +18,8 @@ static const double PIXEL_VARIANCE = 1.0 / 12.0;
 static const double CROWD_PER_PX = 0.0006;
 /* Half width of the fitted pixels, and their reach beyond the ends, sigma. */
 static const double BAND_SIGMA = 4.0, BEYOND_SIGMA = 5.0;
+/* Least distance of two maxima on a streak, px: they are no neighbours. */
+static const double LEAST_SPACING = 2.0;
 /* Half length of the shortest segment, sigma: a shorter one is a blend of two points. */
 static const double LEAST_HALF_SIGMA = 3.0;
 /* A bend is fitted to segments of this half length, sigma, if chi-square falls by BEND_GAIN. The
@@ -32,6 +34,8 @@ static const double OWN_SHARE = 1.5, OWN_SNR = 5.0;
 static const double STARS_IN_ROW = 2.5;
 /* Share of the squared SNR that errors of the PSF and of the rate may add to chi-square. */
 static const double UNEVEN_SHARE = 0.05;
+/* Pixels on a segment's line are at most 1 px apart along it where none is left out. */
+static const double LEAST_HIDDEN_PX = 2.0;
 /* Step by which a segment is shortened to the frame. */
 static const double TRIM_PX = 0.25;
 /* Distance from the frame, sigma, from which no light reaches it: 1e-3 of a segment's brightness.
@@ -41,16 +45,18 @@ static const double CUT_SIGMA = 3.0;
  * mean square for lengths of which a third to all is visible is 0.42 of it. */
 static const double CUT_SHARE = 0.5;
 
-bst_status bst_streak_fragments_create(bst_ctx *ctx, double max_sigma_px,
+bst_status bst_streak_fragments_create(bst_ctx *ctx, int width, int height, double max_sigma_px,
                                        bst_streak_fragments *out) {
-    assert(out && max_sigma_px > 0.0);
+    assert(out && width > 0 && height > 0 && max_sigma_px > 0.0);
     double sigma = sqrt(max_sigma_px * max_sigma_px + PIXEL_VARIANCE);
-    double length = BST_STREAK_MAX_LENGTH + 2.0 * BEYOND_SIGMA * sigma;
+    double length = hypot(width, height) + 2.0 * BEYOND_SIGMA * sigma;
     *out =
-        (bst_streak_fragments){.capacity = (int)(1.5 * length * (2.0 * BAND_SIGMA * sigma + 2.0))};
+        (bst_streak_fragments){.capacity = (int)(1.5 * length * (2.0 * BAND_SIGMA * sigma + 2.0)),
+                               .fragment_capacity = (int)ceil(length / LEAST_SPACING)};
     out->pixels = calloc((size_t)out->capacity, sizeof *out->pixels);
-    out->fragments = calloc(BST_STREAK_MAX_FRAGMENTS, sizeof *out->fragments);
-    if (!out->pixels || !out->fragments) {
+    out->fragments = calloc((size_t)out->fragment_capacity, sizeof *out->fragments);
+    out->parts = calloc((size_t)out->fragment_capacity, sizeof *out->parts);
+    if (!out->pixels || !out->fragments || !out->parts) {
         bst_streak_fragments_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pixels of long streaks");
     }
@@ -60,6 +66,7 @@ bst_status bst_streak_fragments_create(bst_ctx *ctx, double max_sigma_px,
 void bst_streak_fragments_free(bst_streak_fragments *s) {
     free(s->pixels);
     free(s->fragments);
+    free(s->parts);
     *s = (bst_streak_fragments){0};
 }
 
@@ -195,7 +202,7 @@ static void sort_sources(bst_streak_fragments *j, const view *v, const bst_segme
             leave_out(j, v, s);
         } else if (gap > 2.0 * v->sigma) {
             leave_out_beyond(j, on, at.side, on->half_px + 0.5 * gap);
-        } else if (j->fragment_count < BST_STREAK_MAX_FRAGMENTS) {
+        } else if (j->fragment_count < j->fragment_capacity) {
             j->fragments[j->fragment_count++] = i;
         }
     }
@@ -206,6 +213,7 @@ typedef struct line {
     bst_segment segment;
     bst_segment_errors errors;
     double output;
+    double hidden_px[2]; /* width of the left-out pixels in which its start and end are; 0: none */
 } line;
 
 static double output_of(const bst_segment *s, double noise_e) {
@@ -239,11 +247,8 @@ static double end_in_frame(const view *v, const bst_segment *s, double side, dou
 /* Moves the ends that the frame cuts to where the segment leaves it by margin_px. */
 static void trim(const view *v, double margin_px, bst_segment *s) {
     double start = end_in_frame(v, s, -1.0, margin_px), end = end_in_frame(v, s, 1.0, margin_px);
-    double middle = 0.5 * (start + end), share = fmax(0.5 * (end - start), TRIM_PX) / s->half_px;
-    bst_segment_place(s, middle, &s->x_px, &s->y_px);
-    s->angle_rad += 2.0 * s->bend_per_px * middle;
-    s->half_px *= share;
-    s->flux_e *= share;
+    double least = 0.5 * (start + end) - TRIM_PX;
+    *s = bst_segment_part(s, fmin(start, least), fmax(end, least + 2.0 * TRIM_PX));
 }
 
 /* True if chi-square on a number of pixels is that of noise. */
@@ -256,8 +261,8 @@ static bool is_even(const bst_segment_errors *e, int count) {
  * frame. */
 static bool fit(bst_streak_fragments *j, const view *v, double noise_e, line *at) {
     bst_segment_freedom freedom = {.bent = false};
-    freedom.held[0] = is_cut(v, &at->segment, -1.0);
-    freedom.held[1] = is_cut(v, &at->segment, 1.0);
+    freedom.held[0] = is_cut(v, &at->segment, -1.0) || at->hidden_px[0] > 0.0;
+    freedom.held[1] = is_cut(v, &at->segment, 1.0) || at->hidden_px[1] > 0.0;
     trim(v, CUT_SIGMA * v->sigma, &at->segment);
     if (!take_pixels(j, v, &at->segment)) {
         return false;
@@ -280,6 +285,49 @@ static bool fit(bst_streak_fragments *j, const view *v, double noise_e, line *at
     return good;
 }
 
+/* Pixels along a segment's line on both sides of a place. */
+typedef struct gap {
+    double inner, outer;
+} gap;
+
+static gap gap_at(const bst_streak_fragments *j, const view *v, const bst_segment *s, double side,
+                  double place) {
+    gap g = {-s->half_px, s->half_px + BEYOND_SIGMA * v->sigma};
+    for (int i = 0; i < j->count; i++) {
+        const bst_segment_pixel *p = &j->pixels[i];
+        double along, across = bst_segment_distance(s, (double)p->x_px, (double)p->y_px, &along);
+        along *= side;
+        if (across < v->sigma + 0.5) {
+            g.inner = along <= place ? fmax(g.inner, along) : g.inner;
+            g.outer = along > place ? fmin(g.outer, along) : g.outer;
+        }
+    }
+    return g;
+}
+
+/* Moves an end that is among left-out pixels, or near their edge, to their middle; side: -1 or 1.
+ * Returns their width. */
+static double centre_hidden(const bst_streak_fragments *j, const view *v, double side,
+                            bst_segment *s) {
+    const double half = s->half_px, places[3] = {half, half + v->sigma, half - 2.0 * v->sigma};
+    for (int k = 0; k < 3 && !is_cut(v, s, side); k++) {
+        const gap g = gap_at(j, v, s, side, places[k]);
+        if (g.outer - g.inner > LEAST_HIDDEN_PX) {
+            const double end = side * 0.5 * (g.inner + g.outer), other = -side * half;
+            *s = bst_segment_part(s, fmin(end, other), fmax(end, other));
+            return g.outer - g.inner;
+        }
+    }
+    return 0.0;
+}
+
+/* Fits a segment with its hidden ends held; false: it is no segment. */
+static bool hold_hidden(bst_streak_fragments *j, const view *v, double noise_e, line *at) {
+    at->hidden_px[0] = centre_hidden(j, v, -1.0, &at->segment);
+    at->hidden_px[1] = centre_hidden(j, v, 1.0, &at->segment);
+    return (at->hidden_px[0] == 0.0 && at->hidden_px[1] == 0.0) || fit(j, v, noise_e, at);
+}
+
 /* Moves the ends of a segment outwards to where the light ends; false: it is no segment. */
 static bool grow(bst_streak_fragments *j, const view *v, double noise_e, line *at) {
     for (int round = 0; round < ROUNDS; round++) {
@@ -289,33 +337,27 @@ static bool grow(bst_streak_fragments *j, const view *v, double noise_e, line *a
         }
         double change = fabs(at->segment.half_px - before.half_px) +
                         hypot(at->segment.x_px - before.x_px, at->segment.y_px - before.y_px);
-        double back =
-            bst_streak_rays_beyond(&v->rays, &at->segment, -1.0, at->output, BST_STREAK_MAX_LENGTH);
-        double ahead =
-            bst_streak_rays_beyond(&v->rays, &at->segment, 1.0, at->output, BST_STREAK_MAX_LENGTH);
+        double back = bst_streak_rays_beyond(&v->rays, &at->segment, -1.0, at->output);
+        double ahead = bst_streak_rays_beyond(&v->rays, &at->segment, 1.0, at->output);
         if (back + ahead < 2.0 * v->sigma) {
             if (change < v->sigma) {
-                return true;
+                break;
             }
             continue; /* with the pixels about the ends of the fit */
         }
-        bst_segment *s = &at->segment;
-        double length = 2.0 * s->half_px, x, y;
-        bst_segment_place(s, 0.5 * (ahead - back), &x, &y);
-        /* the axis follows the bend */
-        s->angle_rad += 2.0 * s->bend_per_px * 0.5 * (ahead - back);
-        s->x_px = x;
-        s->y_px = y;
-        s->half_px += 0.5 * (back + ahead);
-        s->flux_e *= 2.0 * s->half_px / length;
+        if (round + 1 == ROUNDS) {
+            return false; /* its ends do not settle */
+        }
+        at->segment = bst_segment_part(&at->segment, -at->segment.half_px - back,
+                                       at->segment.half_px + ahead);
     }
-    return true;
+    return hold_hidden(j, v, noise_e, at);
 }
 
 /* Chi-square of the fragments as sources of their own, and their number of parameters. */
 static double chi_square_of_fragments(const bst_streak_fragments *j, const view *v, double noise_e,
                                       int *parameters) {
-    bst_segment part[BST_STREAK_MAX_FRAGMENTS];
+    bst_segment *part = j->parts;
     *parameters = 0;
     for (int k = 0; k < j->fragment_count; k++) {
         const bst_imgproc_found *s = &v->l->found[j->fragments[k]];
@@ -327,7 +369,12 @@ static double chi_square_of_fragments(const bst_streak_fragments *j, const view 
         const bst_segment_pixel *p = &j->pixels[i];
         double total = 0.0;
         for (int k = 0; k < j->fragment_count; k++) {
-            total += part[k].flux_e * bst_segment_share(&part[k], (double)p->x_px, (double)p->y_px);
+            const double x = (double)p->x_px - part[k].x_px, y = (double)p->y_px - part[k].y_px;
+            const double reach = part[k].half_px + 8.0 * v->sigma;
+            if (x * x + y * y < reach * reach) {
+                total +=
+                    part[k].flux_e * bst_segment_share(&part[k], (double)p->x_px, (double)p->y_px);
+            }
         }
         double r = (double)p->signal_e - total;
         chi += r * r / (noise_e * noise_e + v->f->excess * fmax(total, 0.0));
@@ -390,6 +437,17 @@ static void widen_cut(const view *v, bst_imgproc_found *s, double turn_variance)
     s->flags |= BST_DETECTION_EDGE;
 }
 
+/* Sum of the variances of the places of both ends, evenly among the pixels that hide them and one
+ * sigma of the PSF beside these. */
+static double ends_variance(const view *v, const line *at) {
+    double sum = 0.0;
+    for (int e = 0; e < 2; e++) {
+        double width = at->hidden_px[e] > 0.0 ? at->hidden_px[e] + 2.0 * v->sigma : 0.0;
+        sum += width * width / 12.0;
+    }
+    return sum;
+}
+
 /* Makes source i the streak of a segment and drops the other fragments. */
 static void replace(bst_streak_fragments *j, const view *v, int i, const line *at) {
     bst_imgproc_found *s = &v->l->found[i];
@@ -400,30 +458,32 @@ static void replace(bst_streak_fragments *j, const view *v, int i, const line *a
         part->dropped = true;
     }
     const bst_segment *g = &at->segment;
-    const double c = cos(g->angle_rad), q = sin(g->angle_rad);
+    const double c = cos(g->angle_rad), q = sin(g->angle_rad), ends = ends_variance(v, at);
     const double bend = 2.0 / 3.0 * g->bend_per_px * g->half_px * g->half_px;
+    const double per_px = g->flux_e / (2.0 * g->half_px);
     s->dropped = false;
     s->streak = s->own_streak = s->joined = true;
     s->rough = false;
     s->flags = flags;
     s->label = BST_LABEL_UNKNOWN;
     s->label_probability = 0.0;
-    s->source = (bst_imgproc_source){.shape = {.x_px = g->x_px,
-                                               .y_px = g->y_px,
-                                               .dx_px = 2.0 * g->half_px * c,
-                                               .dy_px = 2.0 * g->half_px * q,
-                                               .bend_x_px = -bend * q,
-                                               .bend_y_px = bend * c,
-                                               .sigma_px = v->l->profiles.sigma_px},
-                                     .flux_e = g->flux_e,
-                                     .widening_px2 = s->source.widening_px2,
-                                     .cov_xx = at->errors.cov_xx,
-                                     .cov_xy = at->errors.cov_xy,
-                                     .cov_yy = at->errors.cov_yy,
-                                     .flux_variance = at->errors.flux_variance,
-                                     .chi_square = at->errors.chi_square,
-                                     .pixels = j->count,
-                                     .fitted = true};
+    s->source =
+        (bst_imgproc_source){.shape = {.x_px = g->x_px,
+                                       .y_px = g->y_px,
+                                       .dx_px = 2.0 * g->half_px * c,
+                                       .dy_px = 2.0 * g->half_px * q,
+                                       .bend_x_px = -bend * q,
+                                       .bend_y_px = bend * c,
+                                       .sigma_px = v->l->profiles.sigma_px},
+                             .flux_e = g->flux_e,
+                             .widening_px2 = s->source.widening_px2,
+                             .cov_xx = at->errors.cov_xx + 0.25 * ends * c * c,
+                             .cov_xy = at->errors.cov_xy + 0.25 * ends * c * q,
+                             .cov_yy = at->errors.cov_yy + 0.25 * ends * q * q,
+                             .flux_variance = at->errors.flux_variance + ends * per_px * per_px,
+                             .chi_square = at->errors.chi_square,
+                             .pixels = j->count,
+                             .fitted = true};
     s->snr = g->flux_e * at->errors.norm / s->noise_e;
     s->length_px =
         BST_FWHM_PER_SIGMA * sqrt(g->half_px * g->half_px / 3.0 + v->f->sigma_px * v->f->sigma_px);
@@ -446,7 +506,12 @@ static void join(bst_streak_fragments *j, const view *v, int i) {
     }
     at.output = output_of(&at.segment, s->noise_e);
     if (grow(j, v, s->noise_e, &at) && has_fragment(j, i) && is_better(j, v, s->noise_e, &at)) {
+        /* the light beyond the frame is no light of its image: the SNR stays */
+        double whole = at.segment.half_px;
         trim(v, 0.0, &at.segment);
+        double share = at.segment.half_px / whole;
+        at.errors.norm /= share;
+        at.errors.flux_variance *= share * share;
         replace(j, v, i, &at);
     }
 }

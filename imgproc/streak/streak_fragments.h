@@ -5,25 +5,22 @@
 #include "imgproc/measure/locate.h"
 #include "imgproc/streak/segment_fit.h"
 
-enum {
-    BST_STREAK_MAX_FRAGMENTS = 128,
-    BST_STREAK_MAX_LENGTH = 512, /* of a streak that is put together, px */
-};
-
 /* Work space. */
 typedef struct bst_streak_fragments {
     bst_segment_pixel *pixels; /* [capacity] */
     int capacity, count;
-    int *fragments; /* [BST_STREAK_MAX_FRAGMENTS]: sources on the segment */
-    int fragment_count;
+    int *fragments;     /* [fragment_capacity]: sources on the segment */
+    bst_segment *parts; /* [fragment_capacity]: their paths */
+    int fragment_capacity, fragment_count;
 } bst_streak_fragments;
 
 /* Allocates the work space.
  *
- * Given:     max_sigma_px  widest PSF of a frame
+ * Given:     width, height  of the largest frame: a streak may be as long as its diagonal, px
+ *            max_sigma_px   widest PSF of a frame
  * Errors:    BST_ERR_MEMORY; then `out` holds nothing to free
  * Ownership: free with bst_streak_fragments_free */
-bst_status bst_streak_fragments_create(bst_ctx *ctx, double max_sigma_px,
+bst_status bst_streak_fragments_create(bst_ctx *ctx, int width, int height, double max_sigma_px,
                                        bst_streak_fragments *out) BST_MUST_CHECK;
 /* Frees the memory of a work space and clears the struct, which belongs to the caller. */
 void bst_streak_fragments_free(bst_streak_fragments *fragments);
@@ -37,7 +34,8 @@ void bst_streak_fragments_free(bst_streak_fragments *fragments);
  *    beyond them grows, until neither moves.
  * 3. The segment replaces the sources on it if its chi-square, with twice the number of parameters,
  *    is lower by 9 (by 22 if there is only one) and is that of noise. Sources that are too bright
- *    for it stay, and their pixels are left out.
+ *    for it stay, and their pixels are left out. An end among left-out pixels is held in the middle
+ *    of them, and their width counts in the covariance.
  *
  * A streak of unknown rate whose end the frame cuts has the standard deviation of half its visible
  * length along itself: the part beyond is unknown. Nothing is joined in a crowd, where stars line

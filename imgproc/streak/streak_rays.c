@@ -202,10 +202,10 @@ bool bst_streak_rays_start(const bst_streak_rays *v, const bst_imgproc_found *s,
 }
 
 double bst_streak_rays_beyond(const bst_streak_rays *v, const bst_segment *s, double side,
-                              double line, double most_px) {
+                              double line) {
     light_sum sum = begin_sum(v, line, 2.0 * s->half_px);
     double most = 0.0, length = 0.0;
-    for (int r = 1; sum.ratio > most - LEAST_FALL && 2.0 * (s->half_px + r) < most_px; r++) {
+    for (int r = 1; sum.ratio > most - LEAST_FALL; r++) {
         double x, y;
         bst_segment_place(s, side * (s->half_px + r), &x, &y);
         double z = output_at(v->f->filter, x, y);

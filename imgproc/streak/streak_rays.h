@@ -39,9 +39,8 @@ bool bst_streak_rays_start(const bst_streak_rays *rays, const bst_imgproc_found 
 /* Length by which light goes on beyond an end of a segment, px.
  *
  * Given:     side  -1: its start, 1: its end
- *            line  output of the filter for points on it
- *            most_px  greatest length of the segment and twice what is beyond */
+ *            line  output of the filter for points on it */
 double bst_streak_rays_beyond(const bst_streak_rays *rays, const bst_segment *segment, double side,
-                              double line, double most_px);
+                              double line);
 
 #endif

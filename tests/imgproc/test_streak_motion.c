@@ -98,8 +98,45 @@ static void bend_is_seen(void **state) {
     bst_assert_close(f.across, 1.0, 0.2);
 }
 
+/* Shared variance along streaks of 12 px in a frame without stars, of which nothing is measured. */
+static double shared_along(double own_px, double jitter_px, double telemetry_px) {
+    bst_ctx ctx = {0};
+    synthetic s;
+    synthetic_init(&s, 128, 128);
+    s.config.motion_bend_px = own_px;
+    s.config.jitter_px = jitter_px;
+    bst_imgproc *ip = synthetic_processor(&ctx, &s);
+    bst_detections *d = synthetic_detections(200);
+    bst_camera_motion motion = synthetic_motion(&s, 0.0, 12.0);
+    motion.bend_sigma_rad = telemetry_px * bst_camera_scale_rad(&s.camera);
+    synthetic_expose(&s, bst_rng_make_key(1, 0, "test", "streak_motion"), 0);
+    bst_imgproc_frame f = synthetic_frame(&s);
+    bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &f, &motion, d, 200));
+    double along = d->shared_yy;
+    assert_true(d->shared_xx < 0.1 * along + 1e-12);
+    free(d);
+    bst_imgproc_free(ip);
+    synthetic_free(&s);
+    return along;
+}
+
+/* `motion_bend_px` is a bend as the telemetry's is: its square adds to that and to the square of
+ * 0.075 of the jitter. */
+static void bend_of_its_own_is_shared(void **state) {
+    (void)state;
+    const double one = shared_along(0.1, 0.0, 0.0);
+    assert_true(one > 1e-4 && one < 0.01);
+    bst_assert_close(shared_along(0.0, 0.0, 0.0), 0.0, 1e-12);
+    bst_assert_close(shared_along(0.5, 0.0, 0.0) / one, 25.0, 1e-6);
+    bst_assert_close(shared_along(0.0, 0.0, 0.1) / one, 1.0, 1e-6);
+    bst_assert_close(shared_along(0.3, 0.0, 0.4) / one, 25.0, 1e-6);
+    /* the jitter also widens the PSF, so that streaks of 12 px show a little less of a bend */
+    bst_assert_close(shared_along(0.3, 4.0, 0.0) / shared_along(0.0, 4.0, 0.0), 2.0, 1e-6);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(drift_is_seen),
-                                       cmocka_unit_test(bend_is_seen)};
+                                       cmocka_unit_test(bend_is_seen),
+                                       cmocka_unit_test(bend_of_its_own_is_shared)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,7 +46,8 @@ static bench *make(int binning, double snr) {
         .kind = BST_SOURCE_STAR, .flags = BST_TRUTH_IN_FIELD, .snr = snr, .electrons = 40.0 * snr};
     g->camera = &b->camera;
     g->binning = binning;
-    g->settings.jitter_px = 8.0;
+    g->settings.jitter_px = 4.8; /* a bend of 0.36 px, with the next one 0.6 px */
+    g->settings.motion_bend_px = 0.48;
     g->key = bst_rng_make_key(5, 0, "test", "motion");
     g->total_sigma = 0.9;
     g->fitted_sigma = 0.85;
@@ -96,7 +97,8 @@ static void measure(bench *b, double mean[3], double *scatter) {
 
 /* With the squared SNR Q of a star with the noise of its own brightest pixel, of a streak of length
  * L and width S: variances L^2 / (12 Q) of the bend and 8 S L / Q of length and direction, against
- * (0.075 jitter)^2 + sigma^2 of the telemetry's bend and 1 px^2 of its length. */
+ * (0.075 jitter)^2 + motion_bend_px^2 + sigma^2 of the telemetry's bend and 1 px^2 of its length.
+ */
 static void shares_of_a_path(void **state) {
     (void)state;
     for (int binning = 1; binning <= 2; binning++) {
