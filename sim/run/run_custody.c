@@ -228,11 +228,14 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
 
 /* ---- correlation ---- */
 
-/* Sets the bound of an object, which is largest at an end of the time for which it holds. */
+/* Sets the bound of an object, which is largest at an end of the time for which it holds, with the
+ * process noise until then. */
 static void bound_reach(bst_run_custody *c, int i) {
+    bst_custody_filter last = c->filters[i];
+    bst_custody_add_process_noise(&c->config, c->reach_until_s, &last);
     c->reach_m[i] =
-        fmax(bst_run_reach_of(&c->orbits[i], &c->filters[i], c->reach_until_s - 2.0 * REACH_FOR_S),
-             bst_run_reach_of(&c->orbits[i], &c->filters[i], c->reach_until_s));
+        fmax(bst_run_reach_of(&c->orbits[i], &last, c->reach_until_s - 2.0 * REACH_FOR_S),
+             bst_run_reach_of(&c->orbits[i], &last, c->reach_until_s));
 }
 
 static void bound_reaches(bst_run_custody *c, double time_s) {
