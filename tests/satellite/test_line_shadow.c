@@ -115,7 +115,7 @@ static void hidden_parts_of_lines(void **state) {
 static void silhouettes(void **state) {
     (void)state;
     bst_test_model m = bst_test_model_open(MODEL);
-    bst_vec3 to = bst_vec3_unit((bst_vec3){0.5, 0.2, 0.4});
+    bst_vec3 to = bst_vec3_unit((bst_vec3){0.3, 0.2, 0.6});
     const bst_satellite_aim aim = {.sun = to, .earth = {0, 0, 1}, .target = to};
     bst_satellite_pose_set(m.pose, &aim);
     bst_pose_look(m.pose, 0, to);
