@@ -99,8 +99,79 @@ static void open_sky_between_stars(void **state) {
     }
 }
 
+/* Sum over `axis` of the squares of a filter's sums across it, over the sum of its squares: a
+ * Gaussian that is drawn along (dx, dy), on a grid. */
+static double response_to_offsets(double sigma, double dx, double dy, int axis) {
+    enum { SIDE = 120, PIECES = 100 };
+    static double p[SIDE][SIDE];
+    double step = 0.15, squares = 0.0, sums = 0.0;
+    memset(p, 0, sizeof p);
+    for (int k = 0; k < PIECES; k++) {
+        double u = (k + 0.5) / PIECES - 0.5;
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            double x = step * (i % SIDE - 0.5 * (SIDE - 1)) - u * dx;
+            double y = step * ((double)(i / SIDE) - 0.5 * (SIDE - 1)) - u * dy;
+            p[i / SIDE][i % SIDE] += exp(-0.5 * (x * x + y * y) / (sigma * sigma));
+        }
+    }
+    for (int i = 0; i < SIDE; i++) {
+        double sum = 0.0;
+        for (int k = 0; k < SIDE; k++) {
+            squares += p[i][k] * p[i][k];
+            sum += axis ? p[i][k] : p[k][i];
+        }
+        sums += step * sum * sum;
+    }
+    return sums / squares;
+}
+
+/* Offsets of columns and rows are alike along them: a filter that is long along columns sums those
+ * of few columns. A level that is subtracted from each column takes their offsets away, and one
+ * row's share of the white noise. */
+static void noise_of_columns_and_rows(void **state) {
+    (void)state;
+    const double sigma = 1.2, path[2] = {2.0, 4.5};
+    for (int levels = 0; levels < 2; levels++) {
+        static bst_generator generator;
+        bst_generator *g = &generator;
+        bst_camera camera = {
+            .width_px = 100, .height_px = 100, .gain_e_per_dn = 2.0, .read_noise_e = 5.0};
+        camera.detector.column_offset_rms_e = 2.0;
+        camera.detector.row_offset_rms_e = 1.5;
+        camera.detector.row_noise_e = 1.0;
+        camera.detector.flicker_noise_e = 0.5;
+        *g = (bst_generator){.width = 100,
+                             .height = 80,
+                             .binning = 1,
+                             .camera = &camera,
+                             .noise_e = 6.0,
+                             .excess = 1.0,
+                             .open_share = 1.0,
+                             .filter_sigma = sigma,
+                             .cross_sigma = sigma * sqrt(2.0),
+                             .levels_columns = levels,
+                             .streak = hypot(path[0], path[1]),
+                             .star_path = {path[0], path[1]},
+                             .settings = {.false_alarms_per_frame = 1.0}};
+        g->response.maxima_sigma_px = sigma;
+        g->response.filter.across_px = g->response.filter.along_px = sigma;
+        bst_crlb_table_init(&g->bound, sigma);
+        bst_generator_set_filters(g);
+        double columns = levels ? -1.0 / 80.0 : 4.0 / 36.0, rows = (2.25 + 1.0 + 0.25) / 36.0;
+        bst_assert_close(bst_generator_column_variance(g), levels ? 0.0 : 4.0, 0.0);
+        bst_assert_close(g->white_share, 1.0 - columns - rows, 1e-12);
+        for (int k = 0; k < 2; k++) {
+            double dx = k ? path[0] : 0.0, dy = k ? path[1] : 0.0;
+            double want = 1.0 - columns - rows + columns * response_to_offsets(sigma, dx, dy, 0) +
+                          rows * response_to_offsets(sigma, dx, dy, 1);
+            bst_assert_close(g->filters[k].variance, want, 1e-3 * want); /* of 100 pieces */
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(straight_path_and_what_it_leaves),
-                                       cmocka_unit_test(open_sky_between_stars)};
+                                       cmocka_unit_test(open_sky_between_stars),
+                                       cmocka_unit_test(noise_of_columns_and_rows)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
