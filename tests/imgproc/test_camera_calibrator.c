@@ -164,33 +164,130 @@ static void follows_a_drift(void **state) {
     assert_true(fabs(out.scale - (1.0 + 3e-4 * 59.0 / 60.0)) < 1e-4); /* 1 sigma 3e-5, and lag */
 }
 
-/* The scale's variance grows by that of the walk: of the corner's place, in so many hours. */
+/* The scale's variance grows by that of the walk: of the corner's place, in so many hours; also
+ * where it is known to 1e-7, but not where it is known exactly. */
 static void variance_grows_with_time(void **state) {
     (void)state;
-    const double hours[2] = {0.0, 4.0}, drift_px = 0.3, corner_px = 512.0 * sqrt(2.0);
-    double p[2][2];
-    for (int k = 0; k < 2; k++) {
-        scene s;
-        setup_scene(&s, 5);
-        s.exact = true;
-        s.config.rotation_sigma_deg = s.config.distortion_sigma_px = 0.0;
-        s.config.drift_px_per_sqrt_h = drift_px;
-        make_cameras(&s, 1.0, 0.0, 0.0, (const double[2]){0.0, 0.0});
-        bst_camera_calibrator c;
-        bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
-        bst_camera_calibrator_frame frame = draw(&s, 0);
-        for (int i = 0; i < 2; i++) {
-            bst_camera_calibration out;
-            frame.seconds = 3600.0 * hours[k] * i;
-            assert_true(bst_camera_calibrator_update(&c, &frame));
-            bst_camera_calibrator_get(&c, &out);
-            p[k][i] = out.covariance[0][0];
+    const double hours[2] = {0.0, 4.0}, corner_px = 512.0 * sqrt(2.0);
+    const double drift_px[3] = {0.3, 1e-3, 0.3};
+    for (int fine = 0; fine < 3; fine++) {
+        double p[2][2];
+        for (int k = 0; k < 2; k++) {
+            scene s;
+            setup_scene(&s, 5);
+            s.exact = true;
+            s.config.rotation_sigma_deg = s.config.distortion_sigma_px = 0.0;
+            s.config.drift_px_per_sqrt_h = drift_px[fine];
+            s.config.star_sigma_px = fine == 1 ? 1e-3 : STAR_SIGMA_PX;
+            s.config.scale_sigma = fine == 2 ? 0.0 : 0.02;
+            make_cameras(&s, 1.0, 0.0, 0.0, (const double[2]){0.0, 0.0});
+            bst_camera_calibrator c;
+            bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+            bst_camera_calibrator_frame frame = draw(&s, 0);
+            for (int i = 0; i < STARS && fine == 1; i++) {
+                s.stars[i].cov_xx = s.stars[i].cov_yy = 1e-6;
+            }
+            for (int i = 0; i < 2; i++) {
+                bst_camera_calibration out;
+                frame.seconds = 3600.0 * hours[k] * i;
+                assert_true(bst_camera_calibrator_update(&c, &frame));
+                bst_camera_calibrator_get(&c, &out);
+                p[k][i] = out.covariance[0][0];
+            }
+        }
+        if (fine == 2) {
+            bst_assert_close(p[1][1], 1e-20, 1e-23); /* what an exact parameter has */
+            continue;
+        }
+        double information = 1.0 / p[0][1] - 1.0 / p[0][0]; /* of a frame */
+        double walk = hours[1] * drift_px[fine] * drift_px[fine] / (corner_px * corner_px);
+        bst_assert_close(1.0 / p[1][1] - information, 1.0 / (p[1][0] + walk), 1e-3 / p[1][0]);
+        assert_true(walk > 0.1 * p[1][0]);
+    }
+}
+
+/* Standard deviations before the first frame, in the unit of each parameter; the covariance that is
+ * given out has the units of the calibration. */
+static void units_of_the_covariance(void **state) {
+    (void)state;
+    scene s;
+    setup_scene(&s, 6);
+    const double corner_px = 512.0 * sqrt(2.0), corner = corner_px * 3.0 * BST_ARCSEC_RAD;
+    make_cameras(&s, 1.0, 0.0, 0.0, (const double[2]){0.0, 0.0});
+    bst_camera_calibrator c;
+    bst_camera_calibration out;
+    bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+    bst_camera_calibrator_get(&c, &out);
+    assert_int_equal(out.frames, 0);
+    const double sigma[SIZE] = {0.02, 0.1 * BST_DEG_RAD, 1.0 / corner_px, 1.0 / corner_px,
+                                1.0 / corner_px};
+    for (int i = 0; i < SIZE; i++) {
+        for (int k = 0; k < SIZE; k++) { /* the corner's tangent is its angle to 4e-5 */
+            double want = i == k ? sigma[i] * sigma[i] : 0.0;
+            bst_assert_close(c.p[i][k], want, 2e-4 * want);
+            c.p[i][k] = 1e-8 * (1 + i + k) + (i == k ? 1e-6 : 0.0);
+        }
+        c.x[i] = 1e-3 * (i + 1);
+    }
+    c.frames = 7;
+    bst_camera_calibrator_get(&c, &out);
+    assert_int_equal(out.frames, 7);
+    bst_assert_close(out.scale, exp(1e-3), 1e-12);
+    bst_assert_close(out.rotation_rad, 2e-3, 1e-15);
+    bst_assert_close(out.k1 * corner * corner, 3e-3, 1e-6);
+    bst_assert_close(out.p1 * corner, 4e-3, 1e-6);
+    bst_assert_close(out.p2 * corner, 5e-3, 1e-6);
+    const double unit[SIZE] = {exp(1e-3), 1.0, pow(corner, -2.0), 1.0 / corner, 1.0 / corner};
+    double roll = 20.0 * BST_ARCSEC_RAD;
+    for (int i = 0; i < SIZE; i++) {
+        for (int k = 0; k < SIZE; k++) {
+            double want = c.p[i][k] * unit[i] * unit[k] + (i == 1 && k == 1 ? roll * roll : 0.0);
+            bst_assert_close(out.covariance[i][k], want, 4e-4 * want);
         }
     }
-    double information = 1.0 / p[0][1] - 1.0 / p[0][0]; /* of a frame */
-    double walk = hours[1] * drift_px * drift_px / (corner_px * corner_px);
-    bst_assert_close(1.0 / p[1][1] - information, 1.0 / (p[1][0] + walk), 1e-3 / p[1][0]);
-    assert_true(walk > 0.1 * p[1][0]);
+}
+
+/* Scale and rotation that were found by other means: their errors are independent of all others',
+ * whose covariance stays; what is known exactly stays so. A camera that folds the image changes
+ * nothing. */
+static void coarse_places_are_set(void **state) {
+    (void)state;
+    for (int exact = 0; exact < 2; exact++) {
+        scene s;
+        setup_scene(&s, 7);
+        s.config.rotation_sigma_deg = exact ? 0.0 : 0.1;
+        make_cameras(&s, 1.001, 0.0, 2.0, (const double[2]){0.0, 0.0});
+        bst_camera_calibrator c, before;
+        bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+        bst_camera_calibrator_frame frame = draw(&s, 0);
+        assert_true(bst_camera_calibrator_update(&c, &frame));
+        assert_true(c.p[0][2] != 0.0 && c.p[1][3] != 0.0);
+        before = c;
+        bst_assert_ok(&s.ctx, bst_camera_calibrator_set(&s.ctx, &c, 1.01, 2e-3, 3e-4));
+        bst_assert_close(c.x[0], log(1.01), 1e-15);
+        bst_assert_close(c.x[1], 2e-3, 0.0);
+        for (int i = 0; i < SIZE; i++) {
+            for (int k = 0; k < SIZE; k++) {
+                double want = i >= 2 && k >= 2 ? before.p[i][k]
+                              : i != k         ? 0.0
+                              : i && exact     ? 1e-20
+                                               : 9e-8;
+                bst_assert_close(c.p[i][k], want, 1e-9 * fabs(want));
+            }
+        }
+        for (int i = 2; i < SIZE; i++) {
+            bst_assert_close(c.x[i], before.x[i], 0.0);
+        }
+        /* its camera has the new scale: a place 300 px from the middle */
+        double u, v;
+        bst_vec3 d = bst_camera_unproject(&s.onboard, 811.5, 511.5);
+        assert_true(bst_camera_project(&c.camera, d, &u, &v));
+        bst_assert_close(hypot(u - 511.5, v - 511.5), 300.0 / 1.01, 0.2); /* and 2.0 of k1 */
+        c.x[2] = -5.0; /* the place of a radius r is r (1 - 5 r^2), which falls from 0.26 on */
+        before = c;
+        assert_int_equal(bst_camera_calibrator_set(&s.ctx, &c, 1.0, 0.0, 1.0), BST_ERR_CONFIG);
+        assert_memory_equal(&before, &c, sizeof c);
+    }
 }
 
 /* Frames that no camera explains change nothing; outliers are left out; telemetry without a roll
@@ -229,6 +326,8 @@ int main(void) {
         cmocka_unit_test(covariance_is_that_of_the_errors),
         cmocka_unit_test(follows_a_drift),
         cmocka_unit_test(variance_grows_with_time),
+        cmocka_unit_test(units_of_the_covariance),
+        cmocka_unit_test(coarse_places_are_set),
         cmocka_unit_test(rejects_what_does_not_fit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -271,7 +271,7 @@ def main():
     try:
         library = Library(tree, options.folder, random.Random(options.seed), options.each, scratch)
         library.compile()
-        names = tree.judges_of(library.functions[0].path, "unit")
+        names = sorted(set().union(*(tree.judges_of(path, "unit") for path in {f.path for f in library.functions})))
         tree.make(*sorted({tree.program_of(name) for name in names}))
         with ThreadPoolExecutor(2) as pool:
             tests = list(filter(None, pool.map(lambda n: enter(tree, library, n, options.longest, scratch), names)))

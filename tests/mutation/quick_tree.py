@@ -130,7 +130,19 @@ class QuickTree(build_files.Judges):
             "boresight" if os.path.join(self.build, "boresight") in command else None
 
     def judges_of(self, path, suite):
-        return [n for n in self.tests_for(path, suite) if self.program_of(n) and self.link_of(self.program_of(n))]
+        names = self.tests_for(path, suite)
+        if suite != "e2e":
+            names += self.including(path, set(names))
+        return [n for n in names if self.program_of(n) and self.link_of(self.program_of(n))]
+
+    def including(self, path, others):
+        """Unit tests of other folders that include the header of a source."""
+        own = os.path.splitext(path)[0]
+        own = {own, "boresight/" + os.path.basename(own)}
+        return [n for n, (labels, _, _) in self.tests.items()
+                if n not in others | self.unsound and {"unit", "device"} & set(labels)
+                and not ({"slow"} | self.skipped) & set(labels) and self.program_of(n)
+                and any(own & headers for headers, _ in self.sources_of(self.program_of(n)))]
 
     def is_sound(self, name):
         """Whether a test passes with the sound programs: one that fails there judges nothing."""

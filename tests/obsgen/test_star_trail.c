@@ -178,6 +178,31 @@ static void the_way_has_the_light_of_the_path(void **state) {
     bst_assert_close(on, line, 1e-3 * line + 1e-5);
 }
 
+/* Nodes in all directions are a pixel apart, or less by what rounding to steps of the path leaves:
+ * none is taken for one at another place. */
+static void nodes_of_all_directions(void **state) {
+    (void)state;
+    static path p;
+    static bst_star_trail_node nodes[BST_ROUTE_NODES];
+    for (int n = 0; n < 16; n++) {
+        double c = cos(BST_PI * n / 8.0), s = sin(BST_PI * n / 8.0), length = 25.0;
+        for (int k = 0; k < STEPS; k++) {
+            double u = (double)k / (STEPS - 1) - 0.5;
+            p.x[k] = length * c * u;
+            p.y[k] = length * s * u;
+        }
+        const bst_star_trail_path route = route_of(&p);
+        int count = bst_star_trail_lay(&route, 1.1, nodes), on = 0;
+        for (int i = 0; i < count; i++) {
+            on += nodes[i].time > 0.0 && nodes[i].time < 1.0;
+            double apart =
+                i ? hypot(nodes[i].x - nodes[i - 1].x, nodes[i].y - nodes[i - 1].y) : 1.0;
+            assert_true(apart > 0.69 && apart < 1.1);
+        }
+        assert_true(on >= 24);
+    }
+}
+
 /* The nodes of an even, straight path are on it, at the place of their time, up to its very ends,
  * where only steps to one side are near. */
 static void the_way_of_an_even_path_is_the_path(void **state) {
@@ -239,6 +264,7 @@ int main(void) {
         cmocka_unit_test(fits_land_where_the_light_overlaps_most),
         cmocka_unit_test(bright_points_land_nearer_to_the_centroid),
         cmocka_unit_test(the_way_has_the_light_of_the_path),
+        cmocka_unit_test(nodes_of_all_directions),
         cmocka_unit_test(the_way_of_an_even_path_is_the_path),
         cmocka_unit_test(the_way_of_a_trembling_camera_is_the_ridge_of_the_light),
     };

@@ -38,6 +38,25 @@ static void a_plate_emits_what_it_absorbs(void **state) {
     }
 }
 
+/* Earthlight from three directions: cosines by hand, from the front alone, times the absorptance.
+ */
+static void earthlight_heats_by_its_directions(void **state) {
+    (void)state;
+    bst_test_model m = open_model(PLATE(", \"absorptance\": 0.25"));
+    const bst_earthlight light = {.direction = {{0.6, 0, 0.8}, {0, -0.96, 0.28}, {0.8, 0, -0.6}},
+                                  .irradiance = {0.02, 0.05, 0.4},
+                                  .count = 3,
+                                  .centre = {0, 0, 1}};
+    const bst_heat_environment e = {
+        .sun = {0, 0, -1}, .earth = {0, 0, 1}, .earthlight = &light, .earthlight_wpm2 = 1300.0};
+    double load[2];
+    bst_heat_loads(m.pose, &e, load);
+    int front = m.pose->normals[0].z > 0.0 ? 0 : 1;
+    bst_assert_close(load[front], 0.25 * 1300.0 * (0.02 * 0.8 + 0.05 * 0.28), 1e-9);
+    bst_assert_close(load[1 - front], 0.25 * 1300.0 * 0.4 * 0.6, 1e-9);
+    bst_test_model_close(&m);
+}
+
 /* A sphere of facets: each at its own temperature; together they emit what its disc absorbs. */
 static void a_sphere_emits_what_its_disc_absorbs(void **state) {
     (void)state;
@@ -240,6 +259,7 @@ static void emission_keeps_its_moments(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_plate_emits_what_it_absorbs),
+        cmocka_unit_test(earthlight_heats_by_its_directions),
         cmocka_unit_test(a_sphere_emits_what_its_disc_absorbs),
         cmocka_unit_test(the_view_factor_is_the_integral),
         cmocka_unit_test(the_earth_heats_by_its_infrared),

@@ -219,12 +219,14 @@ static void test_kinds(void **state) {
 }
 
 /* Visible share, box, extent and centre of light of the truth, and the mask of parts, against
- * points of the plate that are in sight. */
-static void test_truth(void **state) {
+ * points of the plate that are in sight. The plate is turned in the image. */
+static void check_truth(fixture *f, double turn) {
     enum { ACROSS = 1000 };
-    fixture *f = *state;
+    const double c = cos(turn), n_turn = sin(turn);
     scene s;
     make_scene(&s, plate, false, 1e4);
+    s.body.q_body_from_gcrf[0] =
+        bst_quat_mul(s.body.q_body_from_gcrf[0], bst_quat_from_rotvec((bst_vec3){0.0, 0.0, -turn}));
     set_limb(&s, 3.3, 3.3);
     bst_truth *truth = calloc(1, sizeof *truth + sizeof truth->items[0]);
     assert_non_null(truth);
@@ -239,8 +241,9 @@ static void test_truth(void **state) {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY}, sum[3] = {0.0};
     double across[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
     for (int n = 0; n < ACROSS * ACROSS; n++) {
-        double at[2] = {s.half[0] * (2.0 * (n % ACROSS + 0.5) / ACROSS - 1.0),
-                        s.half[1] * (2.0 * ((double)(n / ACROSS) + 0.5) / ACROSS - 1.0)};
+        double u = s.half[0] * (2.0 * (n % ACROSS + 0.5) / ACROSS - 1.0);
+        double v = s.half[1] * (2.0 * ((double)(n / ACROSS) + 0.5) / ACROSS - 1.0);
+        double at[2] = {c * u - n_turn * v, n_turn * u + c * v};
         if (hidden(s.body.eye.place[2], at[0], at[1])) {
             continue;
         }
@@ -278,7 +281,9 @@ static void test_truth(void **state) {
     bst_assert_ok(&f->ctx, bst_part_mask_draw(&f->ctx, &parts, &s.camera, &q, mask));
     for (int i = 0; i < SIDE * SIDE; i++) {
         double x = i % SIDE - CENTRE, y = (double)(i / SIDE) - CENTRE, near = 0.0;
-        bool in = fabs(x) < s.half[0] && fabs(y) < s.half[1];
+        double u = fabs(c * x + n_turn * y), v = fabs(c * y - n_turn * x),
+               edge = turn == 0.0 ? 0.0 : 1.0;
+        bool in = u < s.half[0] - edge && v < s.half[1] - edge;
         for (int k = 0; k < 4 && in; k++) { /* pixels at the limb are of either */
             near += hidden(s.body.eye.place[2], x + (k & 1 ? 0.5 : -0.5), y + (k & 2 ? 0.5 : -0.5));
         }
@@ -291,6 +296,13 @@ static void test_truth(void **state) {
     bst_shape_truth_free(&work);
     bst_test_model_close(&s.model);
     free(truth);
+}
+
+static void test_truth(void **state) {
+    const double turns[] = {0.0, 0.4};
+    for (int n = 0; n < 2; n++) {
+        check_truth(*state, turns[n]);
+    }
 }
 
 int main(void) {

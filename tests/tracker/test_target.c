@@ -113,6 +113,39 @@ static void misfit_off_the_diagonal(void **state) {
     bst_assert_close(fit.log_det, log(det), 1e-6);
 }
 
+/* A target is released beyond a chi-square of its rate by the covariance of both directions:
+ * against the cue's rate, and, once it has left that, against its own departure unless it burned.
+ */
+static void released_by_the_covariance_of_its_rate(void **state) {
+    (void)state;
+    bst_target_cue cue = make_cue();
+    cue.rate_sigma_radps = 0.04 * AS;
+    double floor2 = 0.04 * 0.04 * AS * AS + params.rate_floor_radps * params.rate_floor_radps;
+    for (int n = 0; n < 32; n++) {
+        bst_mtt_track t = make_track(1, 0, 0, 13.0);
+        double(*p)[4] = t.state.covariance, angle = BST_PI * (n % 8) / 8.0;
+        bool departed = n >= 16;
+        p[2][2] = 0.0024 * AS * AS;
+        p[3][3] = 0.0011 * AS * AS;
+        p[2][3] = p[3][2] = (n % 16 < 8 ? 0.0014 : -0.0014) * AS * AS;
+        bst_tangent axes = bst_tangent_at(t.state.direction);
+        bst_vec3 own = bst_tangent_carry(cue.direction, t.state.direction, cue.rate_radps);
+        bst_vec3 left = departed ? bst_tangent_vector(&axes, 3.0 * AS, -2.0 * AS) : (bst_vec3){0};
+        const double way[2] = {cos(angle), sin(angle)};
+        double limit =
+            sqrt(params.release_chi2 / chi2_of(way, p[2][2] + floor2, p[2][3], p[3][3] + floor2));
+        for (int k = 0; k < 3; k++) {
+            double off = (k ? 1.001 : 0.999) * limit;
+            t.state.rate_radps = bst_vec3_add(
+                bst_vec3_add(own, left), bst_tangent_vector(&axes, off * way[0], off * way[1]));
+            t.burned = k == 2;
+            const bst_target target = {.id = 1, .departed = departed, .departure_radps = left};
+            bool kept = bst_target_is_expected(&params, &cue, &t, &target);
+            assert_int_equal(kept, k == 0 || (k == 2 && departed));
+        }
+    }
+}
+
 static void takes_the_likeliest(void **state) {
     (void)state;
     bst_mtt_track t[3] = {make_track(1, 100, 1.6, 13), make_track(2, 2160, 0.1, 13),
@@ -509,6 +542,7 @@ static void probabilities_are_calibrated(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(misfit_is_chi_square),
                                        cmocka_unit_test(misfit_off_the_diagonal),
+                                       cmocka_unit_test(released_by_the_covariance_of_its_rate),
                                        cmocka_unit_test(takes_the_likeliest),
                                        cmocka_unit_test(takes_nothing_wrong),
                                        cmocka_unit_test(keeps_and_lets_go),

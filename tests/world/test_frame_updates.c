@@ -146,6 +146,54 @@ static void faults_are_reported(void **state) {
     }
 }
 
+/* Windows at the edges of a sensor of 640 x 480 and one pixel beyond, each side by itself. */
+static void windows_at_the_edges(void **state) {
+    (void)state;
+    static const struct {
+        int window[4];
+        bool good;
+    } cases[] = {{{0, 0, 640, 480}, true},  {{639, 479, 1, 1}, true},  {{0, 0, 641, 480}, false},
+                 {{0, 0, 640, 481}, false}, {{1, 0, 640, 480}, false}, {{0, 1, 640, 480}, false},
+                 {{630, 3, 10, 5}, true},   {{631, 3, 10, 5}, false},  {{3, 475, 10, 5}, true},
+                 {{3, 476, 10, 5}, false},  {{3, 4, 10, 0}, false},    {{3, 4, 0, 10}, false},
+                 {{-1, 0, 10, 10}, false},  {{0, -1, 10, 10}, false}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[300];
+        const int *w = cases[i].window;
+        snprintf(text, sizeof text, FILE_OF("{\"frame\": 4, \"window_px\": [%d, %d, %d, %d]}"),
+                 w[0], w[1], w[2], w[3]);
+        bst_ctx ctx = {0};
+        bst_frame_updates *u;
+        assert_int_equal(parse(&ctx, text, &u) == BST_OK, cases[i].good);
+        bst_frame_updates_free(u);
+    }
+}
+
+/* Any one of the keys of an object's states asks for the three others, and any one of its attitudes
+ * for the other one. */
+static void keys_of_objects_come_together(void **state) {
+    (void)state;
+    static const char *const keys[6] = {
+        "\"start_position_m\": [7e6, 1, 2]", "\"start_velocity_mps\": [1, 2, 3]",
+        "\"end_position_m\": [7e6, 5, 6]",   "\"end_velocity_mps\": [4, 5, 6]",
+        "\"start_q_body_from_gcrf\": " Q,    "\"end_q_body_from_gcrf\": " Q};
+    for (int given = 0; given < 64; given++) {
+        char text[1000] = "", file[1400];
+        for (int k = 0; k < 6; k++) {
+            if (given >> k & 1) {
+                strcat(strcat(text, ", "), keys[k]);
+            }
+        }
+        snprintf(file, sizeof file, FILE_OF("{\"frame\": 4, \"objects\": [{\"object\": \"A\"%s}]}"),
+                 text);
+        bst_ctx ctx = {0};
+        bst_frame_updates *u;
+        bool good = given == 15 || given == 48 || given == 63;
+        assert_int_equal(parse(&ctx, file, &u) == BST_OK, good);
+        bst_frame_updates_free(u);
+    }
+}
+
 /* A distorted camera that folds when its field is made wider. */
 static void a_field_too_wide(void **state) {
     (void)state;
@@ -162,8 +210,9 @@ static void a_field_too_wide(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(everything),
-                                       cmocka_unit_test(faults_are_reported),
-                                       cmocka_unit_test(a_field_too_wide)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(everything), cmocka_unit_test(faults_are_reported),
+        cmocka_unit_test(windows_at_the_edges), cmocka_unit_test(keys_of_objects_come_together),
+        cmocka_unit_test(a_field_too_wide)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
