@@ -150,7 +150,7 @@ static void fits_end_where_they_would_on_fine_pixels(void **state) {
     double places[3];
     for (int i = 0; i < 3; i++) {
         double at[2] = {0.0, 0.0};
-        bst_path_fit_squares squares = bst_path_fit(&route, &model, &model, lights[i], at);
+        bst_path_fit_squares squares = bst_path_fit(&route, &model, lights[i], at);
         assert_true(squares.left > 0.0 && squares.left < 0.1 * squares.all);
         /* across there is nothing to move to */
         bst_assert_close(0.8 * at[1] - 0.6 * at[0], 0.0, 2e-3);
@@ -159,6 +159,30 @@ static void fits_end_where_they_would_on_fine_pixels(void **state) {
         bst_assert_close(left_to_go(&p, length, places[i], lights[i], sigma, INFINITY), 0.0, 6e-3);
     }
     assert_true(fabs(places[2] - places[0]) > 0.2);
+}
+
+/* A star's light rendered once serves fits of any light and model, as one rendered for each. */
+static void light_of_a_star_serves_all_fits(void **state) {
+    (void)state;
+    const double sigma = 1.1, length = 10.0, lights[] = {0.1, 10.0, 1000.0};
+    path p = slowing(length, 0.5);
+    bst_star_trail_path route = route_of(&p);
+    const bst_streak_model model = {.path = {0.8 * length, 0.6 * length}, .sigma_px = sigma},
+                           point = {.sigma_px = sigma};
+    bst_path_light star;
+    bst_path_light_make(&route, sigma, &model, &star);
+    double places[3][2];
+    for (int i = 0; i < 3; i++) {
+        double at[2] = {0.0, 0.0}, alone[2] = {0.0, 0.0}, beside[2] = {0.0, 0.0};
+        bst_path_fit_squares squares = bst_path_fit_light(&star, &model, lights[i], at);
+        bst_path_fit_squares of_point = bst_path_fit_light(&star, &point, lights[i], beside);
+        bst_path_fit_squares same = bst_path_fit(&route, &model, lights[i], alone);
+        assert_memory_equal(at, alone, sizeof at); /* the same operations */
+        assert_memory_equal(&squares, &same, sizeof same);
+        assert_true(of_point.left > squares.left);
+        memcpy(places[i], at, sizeof at);
+    }
+    assert_true(memcmp(places[0], places[2], sizeof places[0]) != 0);
 }
 
 /* The saturated pixels, where the star was slow, are left out: the fit lands farther from the mean
@@ -177,7 +201,7 @@ static void saturated_pixels_are_left_out(void **state) {
     for (int i = 0; i < 2; i++) {
         double at[2] = {0.0, 0.0};
         model.saturated = i > 0 ? full : 0.0;
-        (void)bst_path_fit(&route, &model, &model, light, at);
+        (void)bst_path_fit(&route, &model, light, at);
         places[i] = 0.8 * at[0] + 0.6 * at[1];
     }
     printf("place %.3f, with saturated pixels %.3f\n", places[0], places[1]);
@@ -582,6 +606,7 @@ static void faint_stars_may_be_streaks(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_end_where_they_would_on_fine_pixels),
+        cmocka_unit_test(light_of_a_star_serves_all_fits),
         cmocka_unit_test(saturated_pixels_are_left_out),
         cmocka_unit_test(a_bend_is_measured_on_bright_streaks),
         cmocka_unit_test(outputs_are_those_of_sums),
