@@ -105,7 +105,7 @@ struct bst_smear {
 
     bst_smear_path_point *path, *own_path;
     int path_count, path_capacity, own_capacity;
-    /* the path of which bst_motion_rests was found last; NULL: of none */
+    /* the path of which bst_motion_rests was found last; count 0: of none */
     const bst_smear_path_point *rests_path;
     int rests_count;
     bool rests;

@@ -35,8 +35,8 @@ static BST_INLINED bool reaches(const bst_smear_maker *m, const bst_smear_group 
 }
 
 BST_CLONES_256
-void bst_smear_second_moments(const bst_smear_maker *m, const bst_smear_group *g,
-                              bst_smear_moments *out) {
+static void second_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                           bst_smear_moments *out) {
     double weight = 0.0;
     lanes a = {0}, b = {0}, origin = {0}, first = {0}, by_x = {0}, by_yz = {0};
     bool begun = false;
@@ -84,10 +84,6 @@ static BST_INLINED int points_of(const lanes *a, const lanes *b, bool many, doub
     return many && (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * SHORT_PART <= spread ? 2 : 4;
 }
 
-static BST_INLINED double trace_of(const bst_smear_moments *t) {
-    return t->covariance[0][0] + t->covariance[1][1] + t->covariance[2][2];
-}
-
 /* Sums of a group's higher moments. */
 typedef struct sums {
     double along[7], drift, mixed, across, weight, furthest2;
@@ -118,10 +114,10 @@ static BST_INLINED void add_point(sums *s, const lanes *at, const lanes *axis, d
 }
 
 BST_CLONES_256
-void bst_smear_high_moments(const bst_smear_maker *m, const bst_smear_group *g,
-                            bst_smear_moments *out) {
+static void high_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                         bst_smear_moments *out) {
     bst_smear_nodes_main_axis(out->covariance, out->axis);
-    const double spread = trace_of(out);
+    const double spread = bst_smear_spread(out);
     const bool many = reaches(m, g, g->first + MANY_SEGMENTS - 1);
     const lanes mean = {out->mean[0], out->mean[1], out->mean[2], 0.0};
     const lanes axis = {out->axis[0], out->axis[1], out->axis[2], 0.0};
@@ -150,9 +146,9 @@ void bst_smear_high_moments(const bst_smear_maker *m, const bst_smear_group *g,
 }
 
 BST_CLONES_256
-void bst_smear_kernel_moments(const bst_smear_maker *m, const bst_smear_group *g,
-                              const bst_smear_moments *t, double high[2]) {
-    const double spread = trace_of(t);
+static void kernel_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                           const bst_smear_moments *t, double high[2]) {
+    const double spread = bst_smear_spread(t);
     const bool many = reaches(m, g, g->first + MANY_SEGMENTS - 1);
     const lanes mean = {t->mean[0], t->mean[1], t->mean[2], 0.0};
     const lanes axis = {t->axis[0], t->axis[1], t->axis[2], 0.0};
@@ -173,6 +169,22 @@ void bst_smear_kernel_moments(const bst_smear_maker *m, const bst_smear_group *g
     }
     high[0] /= weight;
     high[1] /= weight;
+}
+
+/* The clones themselves would be seen in the shared library. */
+void bst_smear_second_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                              bst_smear_moments *out) {
+    second_moments(m, g, out);
+}
+
+void bst_smear_high_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                            bst_smear_moments *out) {
+    high_moments(m, g, out);
+}
+
+void bst_smear_kernel_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                              const bst_smear_moments *t, double high[2]) {
+    kernel_moments(m, g, t, high);
 }
 
 /* Squared distance from the mean, over the largest spread of a group, beyond which light is

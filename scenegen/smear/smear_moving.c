@@ -68,8 +68,7 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_scene_source *s
                            double x0, double y0, int *count) {
     const bst_los_track *track = &s->track;
     const bst_quat *turn = s->turn;
-    *count = 0;
-    s->rests_path = NULL;
+    *count = s->rests_count = 0;
     for (int k = 0; k + 1 < track->count; turn += s->parts[k++]) {
         double begin_s = track->time_s[k], length_s = track->time_s[k + 1] - begin_s;
         int all = s->parts[k] < chords ? chords : s->parts[k];

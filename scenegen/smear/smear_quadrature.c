@@ -26,10 +26,6 @@ static bst_status push(bst_ctx *ctx, bst_smear_node_list *list, const double p[3
     return BST_OK;
 }
 
-static double trace_of(const bst_smear_moments *t) {
-    return t->covariance[0][0] + t->covariance[1][1] + t->covariance[2][2];
-}
-
 /* Sets the Peano kernel of a group's rule, unless the group is short. */
 static void set_kernel(const bst_smear_maker *m, const bst_smear_group *g,
                        const bst_smear_moments *t, bst_smear_rule *r) {
@@ -238,7 +234,7 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, bst_smear_group 
     bst_smear_moments t;
     bst_smear_rule best = {.error = INFINITY}, r;
     bst_smear_second_moments(m, &g, &t);
-    double spread = trace_of(&t);
+    double spread = bst_smear_spread(&t);
     double weight = (g.to - g.from) / m->total;
     if (!(spread > 1e-12 * m->variance)) {
         return emit_rest(ctx, m, t.mean, weight);

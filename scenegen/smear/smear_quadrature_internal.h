@@ -77,6 +77,11 @@ typedef struct bst_smear_group {
     double from, to;
 } bst_smear_group;
 
+/* Spread of a group: trace of its covariance, px^2. */
+static inline double bst_smear_spread(const bst_smear_moments *t) {
+    return t->covariance[0][0] + t->covariance[1][1] + t->covariance[2][2];
+}
+
 /* Exact mean and covariance of a group; the other moments are 0. */
 void bst_smear_second_moments(const bst_smear_maker *m, const bst_smear_group *g,
                               bst_smear_moments *out);

@@ -161,30 +161,6 @@ static void fits_end_where_they_would_on_fine_pixels(void **state) {
     assert_true(fabs(places[2] - places[0]) > 0.2);
 }
 
-/* A star's light rendered once serves fits of any light and model, as one rendered for each. */
-static void light_of_a_star_serves_all_fits(void **state) {
-    (void)state;
-    const double sigma = 1.1, length = 10.0, lights[] = {0.1, 10.0, 1000.0};
-    path p = slowing(length, 0.5);
-    bst_star_trail_path route = route_of(&p);
-    const bst_streak_model model = {.path = {0.8 * length, 0.6 * length}, .sigma_px = sigma},
-                           point = {.sigma_px = sigma};
-    bst_path_light star;
-    bst_path_light_make(&route, sigma, &model, &star);
-    double places[3][2];
-    for (int i = 0; i < 3; i++) {
-        double at[2] = {0.0, 0.0}, alone[2] = {0.0, 0.0}, beside[2] = {0.0, 0.0};
-        bst_path_fit_squares squares = bst_path_fit_light(&star, &model, lights[i], at);
-        bst_path_fit_squares of_point = bst_path_fit_light(&star, &point, lights[i], beside);
-        bst_path_fit_squares same = bst_path_fit(&route, &model, lights[i], alone);
-        assert_memory_equal(at, alone, sizeof at); /* the same operations */
-        assert_memory_equal(&squares, &same, sizeof same);
-        assert_true(of_point.left > squares.left);
-        memcpy(places[i], at, sizeof at);
-    }
-    assert_true(memcmp(places[0], places[2], sizeof places[0]) != 0);
-}
-
 /* The saturated pixels, where the star was slow, are left out: the fit lands farther from the mean
  * of the light than that of a star that does not saturate. */
 static void saturated_pixels_are_left_out(void **state) {
@@ -606,7 +582,6 @@ static void faint_stars_may_be_streaks(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_end_where_they_would_on_fine_pixels),
-        cmocka_unit_test(light_of_a_star_serves_all_fits),
         cmocka_unit_test(saturated_pixels_are_left_out),
         cmocka_unit_test(a_bend_is_measured_on_bright_streaks),
         cmocka_unit_test(outputs_are_those_of_sums),
