@@ -26,7 +26,7 @@ static void saturated_bias(const bst_generator *g, const generator_source *s, do
     model.saturated = fmax(bst_generator_saturation_e(g), 0.0) / peak_e;
     bst_star_trail_bias(&g->path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, bias);
-    bst_path_fit(&g->path, &model, &model, light, bias);
+    bst_path_fit(&g->path, &model, light, bias);
 }
 
 /* Mean centroid bias of a fit: stars share the bias by the camera motion; an object in different
@@ -66,7 +66,7 @@ static void shared_bias(const bst_generator *g, const generator_source *s, bool 
                         g->total_sigma, bias);
     if (!bst_generator_is_uniform(g)) {
         const bst_streak_model model = bst_generator_streak_model(g);
-        bst_path_fit(&path, &model, &model, light, bias);
+        bst_path_fit(&path, &model, light, bias);
     }
 }
 

@@ -527,13 +527,17 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
                                 request->window.height / binning, &frame, &buffer));
     double exposure_s = bst_render_exposure_s(request);
     bool staged = binning > 1 || bst_detector_is_staged(r->detector);
+    bst_detector_rows rows = {request->window.y0, request->window.height};
+    if (staged) { /* charge of rows beside the window may pass through the read-out */
+        rows = (bst_detector_rows){0, (int)r->camera.height_px};
+    }
     bst_status status = staged ? BST_OK : build_frame(ctx, r);
     if (status == BST_OK) {
         status = begin_set(ctx, r);
     }
     if (status == BST_OK) {
         status = bst_detector_begin(ctx, r->detector, r->stage, request->key, request->exposure_id,
-                                    exposure_s);
+                                    exposure_s, rows);
     }
     if (status == BST_OK) {
         status = staged ? render_in_stages(ctx, r, request, binning, buffer)

@@ -5,14 +5,14 @@
 
 #include "boresight/vec.h"
 #include "sim/core/cholesky.h"
+#include "sim/core/simd.h"
 
 enum {
     SAMPLES = 64, /* of a path that is not longer than as many steps */
     MODEL = 48,   /* of a streak model */
     LIGHTS = 256, /* of several streaks or a long path */
-    /* of the grid on which light is fitted: along the streak and across */
-    COLUMNS = 96,
-    ROWS = 32,
+    COLUMNS = BST_PATH_COLUMNS,
+    ROWS = BST_PATH_ROWS,
     PARAMETERS = 4,
     ROUNDS = 12
 };
@@ -126,20 +126,21 @@ static grid grid_about(const samples *model, double sigma, double margin) {
                   0.5 * (low[1] + high[1] - step * (rows - 1)), step, columns, rows};
 }
 
-/* Light on the grid and its derivatives by x, by y and by variance. */
+/* Light of a model on the grid and its derivatives by x, by y and by variance. */
 typedef struct planes {
-    double value[4][COLUMNS * ROWS];
-    double full; /* pixels with more light are left out of the fit */
+    double value[4][BST_PATH_PIXELS];
+    double full; /* pixels on which more light is seen are left out of the fit */
 } planes;
 
 /* Adds Gaussians at all samples, displaced by (dx, dy); the derivatives too if `all`. */
+BST_CLONES_256
 static void render(const grid *g, const samples *s, double dx, double dy, double sigma, bool all,
-                   planes *out) {
+                   double (*value)[BST_PATH_PIXELS]) {
     int n = g->columns * g->rows;
     double v = sigma * sigma, across[3][COLUMNS], down[3][ROWS];
     for (int k = 0; k < (all ? 4 : 1); k++) {
         for (int i = 0; i < n; i++) {
-            out->value[k][i] = 0.0;
+            value[k][i] = 0.0;
         }
     }
     for (int i = 0; i < s->count; i++) {
@@ -158,12 +159,11 @@ static void render(const grid *g, const samples *s, double dx, double dy, double
         for (int r = 0; r < g->rows; r++) {
             for (int c = 0; c < g->columns; c++) {
                 int at = r * g->columns + c;
-                out->value[0][at] += down[0][r] * across[0][c];
+                value[0][at] += down[0][r] * across[0][c];
                 if (all) {
-                    out->value[1][at] += down[0][r] * across[1][c];
-                    out->value[2][at] += down[1][r] * across[0][c];
-                    out->value[3][at] +=
-                        0.5 * (down[2][r] * across[0][c] + down[0][r] * across[2][c]);
+                    value[1][at] += down[0][r] * across[1][c];
+                    value[2][at] += down[1][r] * across[0][c];
+                    value[3][at] += 0.5 * (down[2][r] * across[0][c] + down[0][r] * across[2][c]);
                 }
             }
         }
@@ -176,7 +176,7 @@ typedef struct fitted {
 } fitted;
 
 /* One Gauss-Newton step; *squares are those before it. False if the place is settled. */
-static bool improve(const planes *seen, const planes *model, int n, double light, double variance,
+static bool improve(const double *seen, const planes *model, int n, double light, double variance,
                     fitted *f, bst_path_fit_squares *squares) {
     double a[PARAMETERS][PARAMETERS] = {{0.0}}, g[PARAMETERS] = {0.0}, top = 0.0;
     for (int i = 0; i < n; i++) {
@@ -187,11 +187,10 @@ static bool improve(const planes *seen, const planes *model, int n, double light
         double shape = model->value[0][i] + f->widening * model->value[3][i];
         const double by[PARAMETERS] = {f->flux * model->value[1][i], f->flux * model->value[2][i],
                                        shape, f->flux * model->value[3][i]};
-        double left = seen->value[0][i] - f->flux * shape;
-        double weight = seen->value[0][i] > seen->full
-                            ? 0.0
-                            : 1.0 / (1.0 + light * fmax(f->flux * shape, 0.0) / top);
-        squares->all += weight * seen->value[0][i] * seen->value[0][i];
+        double left = seen[i] - f->flux * shape;
+        double weight =
+            seen[i] > model->full ? 0.0 : 1.0 / (1.0 + light * fmax(f->flux * shape, 0.0) / top);
+        squares->all += weight * seen[i] * seen[i];
         squares->left += weight * left * left;
         for (int p = 0; p < PARAMETERS; p++) {
             g[p] += weight * by[p] * left;
@@ -213,38 +212,64 @@ static bool improve(const planes *seen, const planes *model, int n, double light
     return fabs(g[0]) > SETTLED_PX || fabs(g[1]) > SETTLED_PX;
 }
 
-bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
-                                  const bst_streak_model *stamp, double light, double place_px[2]) {
-    bst_path_fit_squares squares = {0.0, 0.0, 0.0};
-    samples star, streak, about;
-    planes seen, shape;
-    sample_path(path, model->sigma_px, &star);
-    sample_model(model, &streak);
+/* Direction of a streak's path. */
+static void direction_of(const bst_streak_model *m, double *cosine, double *sine) {
+    double length = hypot(m->path.dx, m->path.dy);
+    *cosine = length > 0.0 ? m->path.dx / length : 1.0;
+    *sine = length > 0.0 ? m->path.dy / length : 0.0;
+}
+
+void bst_path_light_make(const bst_star_trail_path *path, double sigma_px,
+                         const bst_streak_model *stamp, bst_path_light *out) {
+    samples star, about;
+    sample_path(path, sigma_px, &star);
     sample_model(stamp, &about);
-    double length = hypot(stamp->path.dx, stamp->path.dy);
-    double c = length > 0.0 ? stamp->path.dx / length : 1.0;
-    double s = length > 0.0 ? stamp->path.dy / length : 0.0;
-    turn(&star, c, s);
-    turn(&streak, c, s);
-    turn(&about, c, s);
+    direction_of(stamp, &out->cosine, &out->sine);
+    turn(&star, out->cosine, out->sine);
+    turn(&about, out->cosine, out->sine);
     grid g = grid_about(&about, stamp->sigma_px, MARGIN_SIGMAS * stamp->sigma_px);
-    double sigma = model->sigma_px, image = sqrt(sigma * sigma + star.spread);
-    int n = g.columns * g.rows;
+    double image = sqrt(sigma_px * sigma_px + star.spread);
     for (int i = 0; i < star.count; i++) { /* render() gives each Gaussian the peak of its weight */
-        star.weight[i] *= sigma * sigma / (image * image);
+        star.weight[i] *= sigma_px * sigma_px / (image * image);
     }
-    render(&g, &star, 0.0, 0.0, image, false, &seen);
-    seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
+    render(&g, &star, 0.0, 0.0, image, false, &out->value);
+    out->sigma_px = sigma_px;
+    out->x0_px = g.x0;
+    out->y0_px = g.y0;
+    out->step_px = g.step;
+    out->columns = g.columns;
+    out->rows = g.rows;
+}
+
+bst_path_fit_squares bst_path_fit_light(const bst_path_light *star, const bst_streak_model *model,
+                                        double light, double place_px[2]) {
+    assert(star && model && model->sigma_px == star->sigma_px);
+    bst_path_fit_squares squares = {0.0, 0.0, 0.0};
+    samples streak;
+    planes shape;
+    const double c = star->cosine, s = star->sine, sigma = model->sigma_px;
+    const grid g = {star->x0_px, star->y0_px, star->step_px, star->columns, star->rows};
+    const int n = g.columns * g.rows;
+    sample_model(model, &streak);
+    turn(&streak, c, s);
+    shape.full = model->saturated > 0.0 ? model->saturated : INFINITY;
     fitted f = {place_px[0] * c + place_px[1] * s, place_px[1] * c - place_px[0] * s, 1.0, 0.0};
     bool moving = true;
     for (int round = 0; round < ROUNDS && moving; round++) {
-        render(&g, &streak, f.x, f.y, sigma, true, &shape);
-        moving = improve(&seen, &shape, n, light, sigma * sigma, &f, &squares);
+        render(&g, &streak, f.x, f.y, sigma, true, shape.value);
+        moving = improve(star->value, &shape, n, light, sigma * sigma, &f, &squares);
     }
     place_px[0] = f.x * c - f.y * s;
     place_px[1] = f.x * s + f.y * c;
     squares.flux = f.flux;
     return squares;
+}
+
+bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
+                                  double light, double place_px[2]) {
+    bst_path_light star;
+    bst_path_light_make(path, model->sigma_px, model, &star);
+    return bst_path_fit_light(&star, model, light, place_px);
 }
 
 bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, double image_px,
@@ -261,16 +286,17 @@ bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, 
         f.flux += points[i].flux;
     }
     const samples point = {.weight = {1.0}, .count = 1};
-    planes seen, shape;
+    planes shape;
+    double seen[1][BST_PATH_PIXELS];
     bst_path_fit_squares squares;
     double margin = fmax(MARGIN_SIGMAS * model_px, LEAST_MARGIN_PX);
     grid g = grid_about(&point, saturated > 0.0 ? SATURATED_STEP * model_px : model_px, margin);
     int n = g.columns * g.rows;
-    render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
-    seen.full = saturated > 0.0 ? saturated : INFINITY;
+    render(&g, &seen_at, 0.0, 0.0, image_px, false, seen);
+    shape.full = saturated > 0.0 ? saturated : INFINITY;
     for (int round = 0; round < ROUNDS; round++) { /* the width settles after the place */
-        render(&g, &point, f.x, f.y, model_px, true, &shape);
-        (void)improve(&seen, &shape, n, light, model_px * model_px, &f, &squares);
+        render(&g, &point, f.x, f.y, model_px, true, shape.value);
+        (void)improve(seen[0], &shape, n, light, model_px * model_px, &f, &squares);
     }
     return (bst_path_point_fit){f.x, f.y, f.flux, f.widening};
 }
@@ -309,16 +335,17 @@ bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int coun
     sample_model(&straight, &streak);
     turn(&seen_at, c, s);
     turn(&streak, c, s);
-    planes seen, shape;
+    planes shape;
+    double seen[1][BST_PATH_PIXELS];
     bst_path_fit_squares squares;
     grid g =
         grid_about(&streak, model->saturated > 0.0 ? SATURATED_STEP * sigma : sigma, margin_px);
     const int n = g.columns * g.rows;
-    render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
-    seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
+    render(&g, &seen_at, 0.0, 0.0, image_px, false, seen);
+    shape.full = model->saturated > 0.0 ? model->saturated : INFINITY;
     for (int round = 0; round < ROUNDS; round++) { /* the width settles after the place */
-        render(&g, &streak, f.x, f.y, sigma, true, &shape);
-        (void)improve(&seen, &shape, n, light, sigma * sigma, &f, &squares);
+        render(&g, &streak, f.x, f.y, sigma, true, shape.value);
+        (void)improve(seen[0], &shape, n, light, sigma * sigma, &f, &squares);
         f.x = fmin(fmax(f.x, -limit_px), limit_px);
         f.y = fmin(fmax(f.y, -limit_px), limit_px);
     }

@@ -24,17 +24,42 @@ typedef struct bst_path_fit_squares {
     double all, left, flux;
 } bst_path_fit_squares;
 
+/* Pixels of a grid along a streak and across, on which light is fitted. */
+enum {
+    BST_PATH_COLUMNS = 96,
+    BST_PATH_ROWS = 32,
+    BST_PATH_PIXELS = BST_PATH_COLUMNS * BST_PATH_ROWS
+};
+
+/* Light of a star on its path, on the pixels about a streak. */
+typedef struct bst_path_light {
+    double cosine, sine; /* of the streak's direction, along which the rows lie */
+    double sigma_px;     /* of the PSF */
+    double x0_px, y0_px, step_px;
+    int columns, rows;
+    double value[BST_PATH_PIXELS]; /* [rows][columns] */
+} bst_path_light;
+
+/* Renders the light of a star, for fits on the pixels about `stamp`.
+ *
+ * Given:     sigma_px  deviation of the PSF, including the pixel */
+void bst_path_light_make(const bst_star_trail_path *path, double sigma_px,
+                         const bst_streak_model *stamp, bst_path_light *out);
+
 /* Fits a streak model, or a point (a model of no length), to the light of a star on its true path,
  * in the mean over noise. Free parameters are those of image processing: place, flux and width.
  * Each pixel has the weight 1 / (noise^2 + fitted light).
  *
- * Given:     stamp     streak whose surroundings are fitted; `model` itself unless shapes are
- *                      compared
+ * Given:     model     of the PSF of that light
  *            light     brightest pixel of the fitted light over the variance of the noise
  *            place_px  start of the iterations: (0, 0) or the place for another light
  * Returned:  place_px: relative to the mean of the path, px; the fit's sums of squares */
+bst_path_fit_squares bst_path_fit_light(const bst_path_light *star, const bst_streak_model *model,
+                                        double light, double place_px[2]);
+
+/* Both, for one fit on the pixels about the model. */
 bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
-                                  const bst_streak_model *stamp, double light, double place_px[2]);
+                                  double light, double place_px[2]);
 
 /* A point's light. */
 typedef struct bst_path_point {

@@ -46,16 +46,15 @@ static double light_under_point(const bst_star_trail_path *path, double sigma_px
  *            plain   weighted square of all light without the source's own noise
  *            at_px   start of the point's fit
  * Returned:  *flux   light that the point's fit finds, of the whole */
-static double point_lead(const bst_generator *g, const bst_star_trail_path *path, double light,
+static double point_lead(const bst_star_trail_path *path, const bst_path_light *star, double light,
                          bst_path_fit_squares streak, double plain, double at_px[2], double *flux) {
-    const bst_streak_model model = bst_generator_streak_model(g),
-                           point = {.sigma_px = g->total_sigma};
+    const bst_streak_model point = {.sigma_px = star->sigma_px};
     const double start[2] = {at_px[0], at_px[1]};
-    bst_path_fit_squares fit = bst_path_fit(path, &point, &model, light, at_px);
+    bst_path_fit_squares fit = bst_path_fit_light(star, &point, light, at_px);
     double own = sqrt(fmax(1.0 - fit.left / streak.all, 0.0));
     /* a fit that explains nothing: the point is beyond the pixels of a streak at the mean place */
     *flux =
-        own > 0.0 ? fmin(fmax(fit.flux, 0.0), 1.0) : light_under_point(path, g->total_sigma, start);
+        own > 0.0 ? fmin(fmax(fit.flux, 0.0), 1.0) : light_under_point(path, star->sigma_px, start);
     double other = sqrt(fmax(1.0 - streak.left / streak.all, 0.0));
     return sqrt(streak.all / plain) * (own - other);
 }
@@ -105,6 +104,11 @@ static double by_light(const bst_generator *g, const double table[GENERATOR_BIAS
 /* Centroid bias of the stars' streaks for each light level, and whether a point fits better. */
 static void set_streak_bias(bst_generator *g) {
     const bst_streak_model model = bst_generator_streak_model(g);
+    const bool fitted = !bst_generator_is_uniform(g);
+    bst_path_light star; /* the same for all of them */
+    if (fitted || g->uneven) {
+        bst_path_light_make(&g->path, model.sigma_px, &model, &star);
+    }
     double light = GENERATOR_FIRST_LIGHT, plain = 1.0;
     double at[2] = {g->outputs.point_at[0], g->outputs.point_at[1]};
     bst_star_trail_bias(&g->path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
@@ -114,14 +118,14 @@ static void set_streak_bias(bst_generator *g) {
         if (i > 0) {
             memcpy(g->streak_bias[i], g->streak_bias[i - 1], sizeof g->streak_bias[0]);
         }
-        if (!bst_generator_is_uniform(g) && (i > 0 || g->uneven)) {
-            squares = bst_path_fit(&g->path, &model, &model, light, g->streak_bias[i]);
+        if (fitted && (i > 0 || g->uneven)) {
+            squares = bst_path_fit_light(&star, &model, light, g->streak_bias[i]);
         }
         plain = i == 0 ? squares.all : plain;
         g->point_lead[i] = 0.0;
         if (g->uneven) {
             g->point_lead[i] =
-                point_lead(g, &g->path, light, squares, plain, at, &g->point_flux[i]);
+                point_lead(&g->path, &star, light, squares, plain, at, &g->point_flux[i]);
         }
     }
 }
@@ -173,8 +177,10 @@ static void fit_own_streak(const bst_generator *g, const bst_star_trail_path *pa
     const bst_streak_model own = {.path = {length * c, length * n}, .sigma_px = g->total_sigma},
                            point = {.sigma_px = g->total_sigma};
     double at[2] = {0.0, 0.0}, point_at[2] = {s->start_x, s->start_y};
-    bst_path_fit_squares streak = bst_path_fit(path, &own, &own, light, at);
-    s->own_streak = streak.left < bst_path_fit(path, &point, &own, light, point_at).left;
+    bst_path_light seen;
+    bst_path_light_make(path, g->total_sigma, &own, &seen);
+    bst_path_fit_squares streak = bst_path_fit_light(&seen, &own, light, at);
+    s->own_streak = streak.left < bst_path_fit_light(&seen, &point, light, point_at).left;
     if (s->own_streak) {
         s->start_x = at[0];
         s->start_y = at[1];
@@ -192,12 +198,14 @@ static void set_uneven_object(const bst_generator *g, generator_source *s, doubl
     double light = bst_generator_streak_light(g, s->flux_e), at[2] = {0.0, 0.0};
     bst_star_trail_bias(&path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, at);
-    double plain = bst_path_fit(&path, &model, &model, GENERATOR_FIRST_LIGHT, at).all;
-    bst_path_fit_squares streak = bst_path_fit(&path, &model, &model, light, at);
+    bst_path_light seen;
+    bst_path_light_make(&path, model.sigma_px, &model, &seen);
+    double plain = bst_path_fit_light(&seen, &model, GENERATOR_FIRST_LIGHT, at).all;
+    bst_path_fit_squares streak = bst_path_fit_light(&seen, &model, light, at);
     at[0] = s->start_x = o.point_at[0];
     at[1] = s->start_y = o.point_at[1];
     s->as_streak =
-        !is_point(g, s, &o, point_lead(g, &path, light, streak, plain, at, &s->point_flux));
+        !is_point(g, s, &o, point_lead(&path, &seen, light, streak, plain, at, &s->point_flux));
     efficiency[0] = fmin(o.point, 1.0);
     efficiency[1] = fmin(o.streak, 1.0);
     if (!s->as_streak && s->length > LEAST_OWN_SIGMAS * g->total_sigma &&

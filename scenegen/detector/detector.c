@@ -332,8 +332,8 @@ static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
 /* Row offsets of an exposure that threads draw. */
 typedef struct rows_to_draw {
     const float *fixed;
-    float *sum; /* then the pick-up's amplitudes by row */
-    int height;
+    float *sum;                  /* then the pick-up's amplitudes by row */
+    int height, first;           /* of all rows, and the first one to draw */
     double rms, level;           /* DN */
     double amplitude;            /* of the pick-up, DN */
     double phase, phase_per_row; /* turns */
@@ -344,7 +344,7 @@ typedef struct rows_to_draw {
 /* Draws those of some rows (callback). */
 static void draw_rows(void *user, int begin, int end) {
     const rows_to_draw *all = user;
-    for (int y = begin; y < end; y++) {
+    for (int y = all->first + begin; y < all->first + end; y++) {
         double z = all->rms > 0.0 ? bst_rng_normal(all->key, all->exposure, (uint64_t)y) : 0.0;
         all->sum[y] = all->fixed[y] + (float)(all->level + all->rms * z);
         if (all->amplitude > 0.0) {
@@ -361,12 +361,12 @@ enum { FLICKER_TERMS = 6 };
 
 /* Adds 1/f noise of the level to rows: first-order Markov processes that are stationary from row 0
  * on. */
-static void add_flicker(const rows_to_draw *rows, double rms, bst_rng_key key) {
+static void add_flicker(const rows_to_draw *rows, int end, double rms, bst_rng_key key) {
     double state[FLICKER_TERMS] = {0}, decay[FLICKER_TERMS], share = rms / sqrt(FLICKER_TERMS);
     for (int k = 0; k < FLICKER_TERMS; k++) {
         decay[k] = exp(-1.0 / pow(4.0, k));
     }
-    for (int y = 0; y < rows->height; y++) {
+    for (int y = 0; y < end; y++) {
         double sum = 0.0;
         for (int k = 0; k < FLICKER_TERMS; k++) {
             uint64_t draw = (uint64_t)y * FLICKER_TERMS + (uint64_t)k;
@@ -374,13 +374,14 @@ static void add_flicker(const rows_to_draw *rows, double rms, bst_rng_key key) {
             state[k] = y == 0 ? z : decay[k] * state[k] + sqrt(1.0 - decay[k] * decay[k]) * z;
             sum += state[k];
         }
-        rows->sum[y] += (float)(share * sum);
+        rows->sum[y] += y < rows->first ? 0.0f : (float)(share * sum);
     }
 }
 
-/* Draws and uploads level and row offsets of an exposure, and the pick-up by row. */
+/* Draws and uploads level and row offsets of an exposure, and the pick-up by row; those of other
+ * rows than `read` stay as they were. */
 static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, uint64_t run,
-                             int64_t exposure_id) {
+                             int64_t exposure_id, bst_detector_rows read) {
     const bst_detector_config *c = &d->camera.detector;
     double per_e = 1.0 / d->camera.gain_e_per_dn;
     size_t height = (size_t)d->camera.height_px;
@@ -390,6 +391,7 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
     rows_to_draw rows = {.fixed = d->rows,
                          .sum = sum,
                          .height = (int)height,
+                         .first = read.first,
                          .rms = c->row_noise_e / d->camera.gain_e_per_dn,
                          .level = c->offset_drift_dn_per_frame * (double)exposure_id,
                          .key = bst_rng_make_key(run, 0, "detector", "row_noise"),
@@ -406,9 +408,9 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
         rows.phase = isfinite(c->pick_up.phase_deg) ? c->pick_up.phase_deg / 360.0
                                                     : bst_rng_uniform(level, rows.exposure, 1);
     }
-    bst_parallel_for(d->pool, (int)height, AT_ONCE, draw_rows, &rows);
+    bst_parallel_for(d->pool, read.count, AT_ONCE, draw_rows, &rows);
     if (c->flicker_noise_e > 0.0) {
-        add_flicker(&rows, c->flicker_noise_e * per_e,
+        add_flicker(&rows, read.first + read.count, c->flicker_noise_e * per_e,
                     bst_rng_make_key(run, 0, "detector", "flicker"));
     }
     cl_mem sent;
@@ -420,8 +422,10 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
 }
 
 bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage,
-                              bst_rng_key key, int64_t exposure_id, double exposure_s) {
+                              bst_rng_key key, int64_t exposure_id, double exposure_s,
+                              bst_detector_rows read) {
     assert(d && stage && exposure_id >= 0 && exposure_s >= 0.0);
+    assert(read.first >= 0 && read.count >= 0 && read.first + read.count <= d->camera.height_px);
     const bst_detector_config *c = &d->camera.detector;
     uint64_t run = ((uint64_t)key.k[1] << 32) | key.k[0];
     d->summary = (bst_cosmic_rays_summary){0};
@@ -430,7 +434,7 @@ bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *st
                            exposure_s + c->cosmic_rays.readout_s));
     }
     if (has_frame_offsets(c)) {
-        BST_TRY(begin_rows(ctx, d, stage, run, exposure_id));
+        BST_TRY(begin_rows(ctx, d, stage, run, exposure_id, read));
     }
     return BST_OK;
 }

@@ -66,10 +66,17 @@ bst_window bst_detector_light_window(const bst_camera *camera, bst_window window
  * charge, ramps, 1/f noise of pixels. */
 bool bst_detector_is_staged(const bst_detector *detector);
 
-/* Prepares the per-exposure effects: cosmic rays, level, row offsets, phases of the pick-up. */
+/* Rows of the sensor. */
+typedef struct bst_detector_rows {
+    int first, count;
+} bst_detector_rows;
+
+/* Prepares the per-exposure effects: cosmic rays, level, row offsets, phases of the pick-up.
+ *
+ * Given:     read  the rows to be read out, within the sensor; others have no offsets */
 bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_upload_ring *stage,
-                              bst_rng_key key, int64_t exposure_id,
-                              double exposure_s) BST_MUST_CHECK;
+                              bst_rng_key key, int64_t exposure_id, double exposure_s,
+                              bst_detector_rows read) BST_MUST_CHECK;
 /* Places the cosmic rays of an interval of a ramp in place of those of the interval before.
  *
  * Given:     interval    0, 1, ... */

@@ -12,6 +12,8 @@
 /* Cells per axis: stars of a cell move alike to within UNLIKE of the path length, or UNLIKE_MANY if
  * most cells are used. ANCHORS: nodes about which light is summed. */
 enum { FEW_CELLS = 6, MANY_CELLS = 96, ANCHORS = 48, FEW_SOURCES = 256 };
+/* Up to so many nodes, the motion between any two is computed once for all cells. */
+enum { FEW_NODES = 24 };
 #define UNLIKE 0.01
 #define UNLIKE_MANY 0.06
 /* Nodes closer than this, in sigma, give no motion scale. */
@@ -43,6 +45,7 @@ struct bst_motion_map {
     int count, capacity;
     int side; /* cells per axis */
     double cell_px;
+    double between[FEW_NODES][FEW_NODES]; /* other_motion of two nodes, if there are few */
     double other; /* largest relative motion between any two nodes of a star 1 px away */
     unsigned frame, filled[MANY_CELLS * MANY_CELLS];
     bst_smear_star_motion_cell cells[MANY_CELLS * MANY_CELLS];
@@ -82,6 +85,13 @@ static void measure_steps(bst_motion_map *map) {
                               (a->p[2] - b->p[2]) * (a->p[2] - b->p[2]));
             a->other_step = other_motion(map, a, b);
         }
+    }
+    for (int a = 0; a < map->count && map->count <= FEW_NODES; a++) {
+        for (int n = 0; n < a; n++) {
+            map->between[a][n] = map->between[n][a] =
+                other_motion(map, &map->turns[a], &map->turns[n]);
+        }
+        map->between[a][a] = 0.0;
     }
 }
 
@@ -173,8 +183,10 @@ static double cell_share(const bst_motion_map *map, const place *places, int bin
             if (d2 > reach2 || !p->front) {
                 continue;
             }
-            double other = radius_px * other_motion(map, &map->turns[a], &map->turns[n]);
-            double d = sqrt(d2) * map->f.shrink - other;
+            double other = map->count <= FEW_NODES
+                               ? map->between[a][n]
+                               : other_motion(map, &map->turns[a], &map->turns[n]);
+            double d = sqrt(d2) * map->f.shrink - radius_px * other;
             double q = d > 0.0 ? d * d * per * per : 0.0;
             sum += q < MOST_EXPONENT ? map->turns[n].weight * exp(-q) : 0.0;
         }

@@ -293,7 +293,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     s->frame++;
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
-    s->table_blocks = s->path_count = 0;
+    s->table_blocks = s->path_count = s->rests_count = 0;
     s->travel_px = 0.0;
     for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
         s->levels[n].blocks = 0;

@@ -105,6 +105,10 @@ struct bst_smear {
 
     bst_smear_path_point *path, *own_path;
     int path_count, path_capacity, own_capacity;
+    /* the path of which bst_motion_rests was found last; count 0: of none */
+    const bst_smear_path_point *rests_path;
+    int rests_count;
+    bool rests;
     bst_smear_node_list nodes; /* work space */
     bst_disc_points points;    /* work space */
     double disc_px;            /* radius of the current source's disc or body; 0: a point */

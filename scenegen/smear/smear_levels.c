@@ -14,7 +14,12 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
     }
-    s->nodes.rests |= bst_motion_rests(path, count, BST_STREAK_SIGMAS * s->sigma_px);
+    if (s->rests_path != path || s->rests_count != count) {
+        s->rests = bst_motion_rests(path, count, BST_STREAK_SIGMAS * s->sigma_px);
+        s->rests_path = path;
+        s->rests_count = count;
+    }
+    s->nodes.rests |= s->rests;
     double further = s->options.smoothed_variance_px2 - s->sigma_px * s->sigma_px;
     if (!(s->options.node_sigma_px > 0.0)) { /* another PSF contains the pixel */
         further = 1.0 / 12.0;

@@ -57,13 +57,18 @@ static bool passes_by(const bst_smear *s, const bst_smear_path_point *a,
     return fmin(ax, bx) > far || fmax(ax, bx) < -far || fmin(ay, by) > far || fmax(ay, by) < -far;
 }
 
-/* Image path of a moving source relative to (x0, y0); NAN where it is behind the camera. */
-static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
-                           double miss_px, double x0, double y0, int *count) {
+/* The same from each track sample to the next. */
+static int chords_per_sample(const bst_smear *s, const bst_scene_source *source, double miss_px) {
+    return (int)chords_of(s, source, miss_px) / (s->track.count - 1) + 1;
+}
+
+/* Image path of a moving source, of at least `chords` from sample to sample, relative to (x0, y0);
+ * NAN where it is behind the camera. */
+static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source, int chords,
+                           double x0, double y0, int *count) {
     const bst_los_track *track = &s->track;
-    int chords = (int)chords_of(s, source, miss_px) / (track->count - 1) + 1;
     const bst_quat *turn = s->turn;
-    *count = 0;
+    *count = s->rests_count = 0;
     for (int k = 0; k + 1 < track->count; turn += s->parts[k++]) {
         double begin_s = track->time_s[k], length_s = track->time_s[k + 1] - begin_s;
         int all = s->parts[k] < chords ? chords : s->parts[k];
@@ -133,7 +138,7 @@ bst_quat bst_smear_focal_turn(const bst_smear *s) {
 bst_status bst_smear_centre_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                   double x, double y, double tolerance) {
     int count;
-    BST_TRY(own_path(ctx, s, source, CHORD_PX, x, y, &count));
+    BST_TRY(own_path(ctx, s, source, chords_per_sample(s, source, CHORD_PX), x, y, &count));
     return own_nodes(ctx, s, count, x, y, tolerance);
 }
 
@@ -196,7 +201,8 @@ bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_so
     if (there) {
         return BST_OK;
     }
-    BST_TRY(own_path(ctx, s, source, CHORD_PX, x, y, &count));
+    const int chords = chords_per_sample(s, source, CHORD_PX);
+    BST_TRY(own_path(ctx, s, source, chords, x, y, &count));
     BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
     if (s->nodes.count == 0) {
         return BST_OK;
@@ -219,7 +225,8 @@ bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_so
     double miss_px = bst_smear_allowed(s, s->last_read_e) * CHORD_SHARE * s->sigma_px / CHORD_ERROR;
     miss_px = fmin(fmax(miss_px, LEAST_CHORD_PX), CHORD_PX);
     if (source->path && miss_px < CHORD_PX) {
-        BST_TRY(own_path(ctx, s, source, miss_px, x, y, &count));
+        const int finer = chords_per_sample(s, source, miss_px);
+        BST_TRY(finer > chords ? own_path(ctx, s, source, finer, x, y, &count) : BST_OK);
     }
     s->chord_error = source->path ? CHORD_ERROR * miss_px / s->sigma_px : 0.0;
     int level = bst_smear_choose_level(s, 1.0);

@@ -6,15 +6,8 @@
 #include <string.h>
 
 #include "boresight/vec.h"
-#include "scenegen/smear/gauss_legendre.h"
 #include "scenegen/smear/smear_quadrature_internal.h"
 #include "sim/core/invariant.h"
-
-/* A node group: the path from time `from` (in segment `first`) to `to`. */
-typedef struct group {
-    int first;
-    double from, to;
-} group;
 
 static bst_status push(bst_ctx *ctx, bst_smear_node_list *list, const double p[3], double weight,
                        double variance, const double error[2]) {
@@ -33,163 +26,15 @@ static bst_status push(bst_ctx *ctx, bst_smear_node_list *list, const double p[3
     return BST_OK;
 }
 
-/* Part of segment k inside the group: both ends; returns its duration. */
-static double clip(const bst_smear_maker *m, const group *g, int k, double a[3], double b[3]) {
-    const bst_smear_path_point *p = &m->path[k], *q = p + 1;
-    double length = q->s - p->s;
-    double from = fmax(p->s, g->from), to = fmin(q->s, g->to);
-    if (!(to > from)) {
-        return 0.0;
-    }
-    if (to - from == length) {
-        memcpy(a, p->p, sizeof p->p);
-        memcpy(b, q->p, sizeof q->p);
-        return length;
-    }
-    for (int i = 0; i < 3; i++) {
-        double slope = (q->p[i] - p->p[i]) / length;
-        a[i] = p->p[i] + slope * (from - p->s);
-        b[i] = p->p[i] + slope * (to - p->s);
-    }
-    return to - from;
-}
-
-static bool reaches(const bst_smear_maker *m, const group *g, int k) {
-    return k + 1 < m->count && m->path[k].s < g->to;
-}
-
-/* Exact mean and covariance of a group. */
-static void second_moments(const bst_smear_maker *m, const group *g, bst_smear_moments *out) {
-    double weight = 0.0, a[3], b[3], origin[3] = {0}, first[3] = {0};
-    bool begun = false;
-    memset(out, 0, sizeof *out);
-    for (int k = g->first; reaches(m, g, k); k++) {
-        double w = clip(m, g, k, a, b);
-        if (!(w > 0.0)) {
-            continue;
-        }
-        if (!begun) {
-            memcpy(origin, a, sizeof origin);
-            begun = true;
-        }
-        weight += w;
-        for (int i = 0; i < 3; i++) {
-            a[i] -= origin[i];
-            b[i] -= origin[i];
-            first[i] += w * 0.5 * (a[i] + b[i]);
-        }
-        for (int i = 0; i < 3; i++) {
-            for (int j = 0; j <= i; j++) {
-                out->covariance[i][j] +=
-                    w * ((a[i] * a[j] + b[i] * b[j]) / 3.0 + (a[i] * b[j] + b[i] * a[j]) / 6.0);
-            }
-        }
-    }
-    for (int i = 0; i < 3; i++) {
-        first[i] /= weight;
-        out->mean[i] = origin[i] + first[i];
-    }
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j <= i; j++) {
-            out->covariance[i][j] = out->covariance[i][j] / weight - first[i] * first[j];
-            out->covariance[j][i] = out->covariance[i][j];
-        }
-    }
-}
-
-/* With so many segments in a group the two-point rule suffices for those whose squared length is at
- * most a third of the group's spread, as in equal ones: its error of the fourth moment is 1 /
- * segments^4. */
-enum { MANY_SEGMENTS = 6, SHORT_PART = 3 };
-
-/* Points of the Gauss-Legendre rule of a segment from a to b.
- *
- * Given:     many    the group has MANY_SEGMENTS
- *            spread  of the group */
-static inline int points_of(const double a[3], const double b[3], bool many, double spread) {
-    double x = b[0] - a[0], y = b[1] - a[1], z = b[2] - a[2];
-    return many && (x * x + y * y + z * z) * SHORT_PART <= spread ? 2 : 4;
-}
-
-static double trace_of(const bst_smear_moments *t) {
-    return t->covariance[0][0] + t->covariance[1][1] + t->covariance[2][2];
-}
-
-/* Sets the principal axis and the higher moments about it. */
-static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_moments *out) {
-    double a[3], b[3], weight = 0.0;
-    bst_smear_nodes_main_axis(out->covariance, out->axis);
-    double spread = trace_of(out);
-    bool many = reaches(m, g, g->first + MANY_SEGMENTS - 1);
-    for (int k = g->first; reaches(m, g, k); k++) {
-        double w = clip(m, g, k, a, b);
-        int points = w > 0.0 ? points_of(a, b, many, spread) : 0;
-        for (int n = 0; n < points; n++) {
-            double d[3], x = 0.0, part = w * bst_smear_gauss_weight[points - 1][n];
-            for (int i = 0; i < 3; i++) {
-                d[i] = a[i] + bst_smear_gauss_place[points - 1][n] * (b[i] - a[i]) - out->mean[i];
-                x += d[i] * out->axis[i];
-            }
-            double power = part;
-            for (int o = 0; o <= 6; o++, power *= x) {
-                out->along[o] += power;
-            }
-            for (int i = 0; i < 3; i++) {
-                d[i] -= x * out->axis[i];
-                out->bend[i] += part * x * x * d[i];
-                out->twist[i] += part * x * x * x * d[i];
-            }
-            double y2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            out->furthest2 = fmax(out->furthest2, x * x + y2);
-            out->drift += part * x * y2;
-            out->mixed += part * x * x * y2;
-            for (int i = 0; i < 3; i++) {
-                out->lean[i] += part * d[i] * y2;
-            }
-            out->across += part * y2;
-            weight += part;
-        }
-    }
-    for (int o = 0; o <= 6; o++) {
-        out->along[o] /= weight;
-    }
-    out->drift /= weight;
-    out->mixed /= weight;
-    out->across /= weight;
-    for (int i = 0; i < 3; i++) {
-        out->bend[i] /= weight;
-        out->twist[i] /= weight;
-        out->lean[i] /= weight;
-    }
-}
-
 /* Sets the Peano kernel of a group's rule, unless the group is short. */
-static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear_moments *t,
-                       bst_smear_rule *r) {
+static void set_kernel(const bst_smear_maker *m, const bst_smear_group *g,
+                       const bst_smear_moments *t, bst_smear_rule *r) {
     bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
-    double a[3], b[3], weight = 0.0, high[2] = {0.0, 0.0};
+    double high[2];
     if (r->nodes < 2 || split || bst_smear_most_kernel(r) < BST_LEAST_KERNEL * m->variance) {
         return;
     }
-    double spread = trace_of(t);
-    bool many = reaches(m, g, g->first + MANY_SEGMENTS - 1);
-    for (int k = g->first; reaches(m, g, k); k++) {
-        double w = clip(m, g, k, a, b);
-        int points = w > 0.0 ? points_of(a, b, many, spread) : 0;
-        for (int n = 0; n < points; n++) {
-            double x = 0.0, part = w * bst_smear_gauss_weight[points - 1][n];
-            for (int i = 0; i < 3; i++) {
-                double d = a[i] + bst_smear_gauss_place[points - 1][n] * (b[i] - a[i]) - t->mean[i];
-                x += d * t->axis[i];
-            }
-            double cube = x * x * x, seventh = cube * cube * x;
-            high[0] += part * seventh;
-            high[1] += part * seventh * x;
-            weight += part;
-        }
-    }
-    high[0] /= weight;
-    high[1] /= weight;
+    bst_smear_kernel_moments(m, g, t, high);
     bst_smear_set_kernel(t, high, r);
 }
 
@@ -272,7 +117,7 @@ static void velocity_of(const bst_smear_maker *m, int k, double v[3]) {
 
 /* Whether the velocity hardly changes from the last group to this one. last->velocity becomes that
  * at the end of this one. */
-static bool goes_on(bst_smear_maker *m, const group *range) {
+static bool goes_on(bst_smear_maker *m, const bst_smear_group *range) {
     bst_smear_last_group *last = &m->last;
     double v[3], change2 = 0.0, most2[2] = {0.0, 0.0};
     int k = range->first;
@@ -292,8 +137,8 @@ static bool goes_on(bst_smear_maker *m, const group *range) {
 }
 
 /* Compares a group with the last one, which it becomes. */
-static double beside_last(bst_smear_maker *m, const bst_smear_moments *g, const group *range,
-                          double weight) {
+static double beside_last(bst_smear_maker *m, const bst_smear_moments *g,
+                          const bst_smear_group *range, double weight) {
     bst_smear_last_group *last = &m->last;
     bool smooth = goes_on(m, range);
     double distance2 = 0.0, length = sqrt(12.0 * g->along[2]), speed = length / weight;
@@ -331,7 +176,7 @@ static bst_status emit_rest(bst_ctx *ctx, bst_smear_maker *m, const double mean[
 }
 
 static bst_status emit(bst_ctx *ctx, bst_smear_maker *m, const bst_smear_moments *g,
-                       const group *range, const bst_smear_rule *r, double weight) {
+                       const bst_smear_group *range, const bst_smear_rule *r, double weight) {
     bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
     double beside = beside_last(m, g, range, weight);
     raise_last(m, beside);
@@ -358,7 +203,7 @@ static bst_status emit(bst_ctx *ctx, bst_smear_maker *m, const bst_smear_moments
     return BST_OK;
 }
 
-static bool single_stretch(const bst_smear_maker *m, const group *g) {
+static bool single_stretch(const bst_smear_maker *m, const bst_smear_group *g) {
     int k = g->first;
     while (k + 2 < m->count && m->path[k + 1].s <= g->from) {
         k++;
@@ -374,66 +219,28 @@ static void adapt(bst_smear_maker *m, double error) {
 }
 
 /* Moves *late to the group's part from a path point on, which must lie within it. */
-static void split_at(group *g, group *late, int segment, double at) {
-    *late = (group){segment, at, g->to};
+static void split_at(bst_smear_group *g, bst_smear_group *late, int segment, double at) {
+    *late = (bst_smear_group){segment, at, g->to};
     g->to = at;
 }
 
 /* Most splits of a group. */
 enum { MOST_DEPTH = 40 };
 
-/* Squared distance from the mean, over the largest spread of a group, beyond which light is
- * searched for a tail: on a uniform path it is 3, or less. */
-#define TAIL_SPREADS 4.0
-/* Share of the group's time, less the share of its length, at a path point where the speed changes
- * so much that the faster part is faint: beside a turning point it is at most 1 / 4. */
-#define SPEED_CHANGE_SHARE 0.35
-
-/* Finds the path point where a group's speed changes most, if part of its way is a long and faint
- * tail. Errors of a group's quadrature lie along its whole way (Peano kernel), also far from its
- * light, where there is less noise than at its peak: an interval of a composite rule must not
- * contain a jump of the integrand.
- *
- * Returned:  segment that begins there; -1: there is no such tail */
-static int find_speed_change(const bst_smear_maker *m, const group *g, const bst_smear_moments *t) {
-    if (!(t->furthest2 > TAIL_SPREADS * m->limit)) {
-        return -1;
-    }
-    double a[3], b[3], way = 0.0, so_far = 0.0, most = SPEED_CHANGE_SHARE;
-    int change = -1;
-    for (int round = 0; round < 2; round++) {
-        for (int k = g->first; reaches(m, g, k); k++) {
-            if (!(clip(m, g, k, a, b) > 0.0)) {
-                continue;
-            }
-            double share = (m->path[k].s - g->from) / (g->to - g->from);
-            double apart = fabs(share - so_far / way);
-            if (round > 0 && m->path[k].s > g->from && apart > most) {
-                most = apart;
-                change = k;
-            }
-            double *to = round == 0 ? &way : &so_far;
-            *to += sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) +
-                        (b[2] - a[2]) * (b[2] - a[2]));
-        }
-    }
-    return change;
-}
-
 /* Replaces a group by nodes, or by two parts of its time if no rule is accurate enough: its halves,
  * or those before and after a jump of the speed. */
-static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int depth) {
-    group late;
+static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, bst_smear_group g, int depth) {
+    bst_smear_group late;
     bst_smear_moments t;
     bst_smear_rule best = {.error = INFINITY}, r;
-    second_moments(m, &g, &t);
-    double spread = trace_of(&t);
+    bst_smear_second_moments(m, &g, &t);
+    double spread = bst_smear_spread(&t);
     double weight = (g.to - g.from) / m->total;
     if (!(spread > 1e-12 * m->variance)) {
         return emit_rest(ctx, m, t.mean, weight);
     }
-    high_moments(m, &g, &t);
-    int change = find_speed_change(m, &g, &t);
+    bst_smear_high_moments(m, &g, &t);
+    int change = bst_smear_find_speed_change(m, &g, &t);
     if (change >= 0 && depth < MOST_DEPTH) {
         split_at(&g, &late, change, m->path[change].s);
         BST_TRY(close_group(ctx, m, g, depth + 1));
@@ -526,7 +333,7 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
     }
     /* 5 % below: the path is not quite uniform */
     m.limit = m.most = 0.95 * m.variance * cbrt(tolerance / m.pixel_part[2] * 48.0 / 0.617);
-    group g = {0, path[0].s, path[0].s};
+    bst_smear_group g = {0, path[0].s, path[0].s};
     extent e = {0};
     for (int k = 0; k + 1 < count; k++) {
         const bst_smear_path_point *p = &path[k], *q = p + 1;
@@ -554,10 +361,11 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         pieces = pieces < 1 ? 1 : pieces;
         double step = (q->s - p->s) / pieces;
         for (int n = 0; n + 1 < pieces; n++) {
-            BST_TRY(close_group(ctx, &m, (group){k, p->s + n * step, p->s + (n + 1) * step}, 0));
+            BST_TRY(close_group(ctx, &m,
+                                (bst_smear_group){k, p->s + n * step, p->s + (n + 1) * step}, 0));
         }
         /* the last piece starts the next group */
-        g = (group){k, p->s + (pieces - 1) * step, q->s};
+        g = (bst_smear_group){k, p->s + (pieces - 1) * step, q->s};
         e = (extent){0};
         for (int i = 0; i < 3; i++) {
             a[i] = (q->p[i] - p->p[i]) * (pieces - 1) / pieces;

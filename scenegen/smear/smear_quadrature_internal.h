@@ -71,6 +71,35 @@ typedef struct bst_smear_maker {
     bst_smear_last_group last;
 } bst_smear_maker;
 
+/* A node group: the path from time `from` (in segment `first`) to `to`. */
+typedef struct bst_smear_group {
+    int first;
+    double from, to;
+} bst_smear_group;
+
+/* Spread of a group: trace of its covariance, px^2. */
+static inline double bst_smear_spread(const bst_smear_moments *t) {
+    return t->covariance[0][0] + t->covariance[1][1] + t->covariance[2][2];
+}
+
+/* Exact mean and covariance of a group; the other moments are 0. */
+void bst_smear_second_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                              bst_smear_moments *out);
+/* Sets the principal axis and the higher moments about it. */
+void bst_smear_high_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                            bst_smear_moments *out);
+/* E[x^7] and E[x^8] of a group along its axis. */
+void bst_smear_kernel_moments(const bst_smear_maker *m, const bst_smear_group *g,
+                              const bst_smear_moments *t, double high[2]);
+/* Finds the path point where a group's speed changes most, if part of its way is a long and faint
+ * tail. Errors of a group's quadrature lie along its whole way (Peano kernel), also far from its
+ * light, where there is less noise than at its peak: an interval of a composite rule must not
+ * contain a jump of the integrand.
+ *
+ * Returned:  segment that begins there; -1: there is no such tail */
+int bst_smear_find_speed_change(const bst_smear_maker *m, const bst_smear_group *g,
+                                const bst_smear_moments *t);
+
 /* Direction of the largest eigenvalue of a symmetric positive semidefinite matrix; an intermediate
  * one for equal eigenvalues. */
 void bst_smear_nodes_main_axis(double a[3][3], double axis[3]);

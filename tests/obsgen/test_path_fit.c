@@ -150,7 +150,7 @@ static void fits_end_where_they_would_on_fine_pixels(void **state) {
     double places[3];
     for (int i = 0; i < 3; i++) {
         double at[2] = {0.0, 0.0};
-        bst_path_fit_squares squares = bst_path_fit(&route, &model, &model, lights[i], at);
+        bst_path_fit_squares squares = bst_path_fit(&route, &model, lights[i], at);
         assert_true(squares.left > 0.0 && squares.left < 0.1 * squares.all);
         /* across there is nothing to move to */
         bst_assert_close(0.8 * at[1] - 0.6 * at[0], 0.0, 2e-3);
@@ -177,7 +177,7 @@ static void saturated_pixels_are_left_out(void **state) {
     for (int i = 0; i < 2; i++) {
         double at[2] = {0.0, 0.0};
         model.saturated = i > 0 ? full : 0.0;
-        (void)bst_path_fit(&route, &model, &model, light, at);
+        (void)bst_path_fit(&route, &model, light, at);
         places[i] = 0.8 * at[0] + 0.6 * at[1];
     }
     printf("place %.3f, with saturated pixels %.3f\n", places[0], places[1]);

@@ -1,5 +1,5 @@
 /* Effects between pixels on a sensor whose sides are no multiples of the kernels' vectors and
- * blocks: traps along rows, and crosstalk. */
+ * blocks: traps along rows, and crosstalk. Rows of windows of it. */
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
@@ -11,12 +11,12 @@ typedef struct fixture {
     bst_camera camera;
 } fixture;
 
-/* A frame with sky and hot pixels, electrons. */
-static void expose(fixture *f, double *electrons) {
+/* A window of a frame with sky and hot pixels, electrons. */
+static void expose_window(fixture *f, bst_window window, double *electrons) {
     const double time_s[2] = {0.0, 0.5};
     const bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
     const bst_los_track track = {2, time_s, q};
-    const bst_render_request request = {.window = {0, 0, WIDTH, HEIGHT},
+    const bst_render_request request = {.window = window,
                                         .exposure_id = 2,
                                         .track = &track,
                                         .background_e = 41.0,
@@ -32,12 +32,16 @@ static void expose(fixture *f, double *electrons) {
                   bst_renderer_create(&f->ctx, f->device, &f->camera, &options, &renderer));
     bst_assert_ok(&f->ctx, bst_renderer_render(&f->ctx, renderer, &request, &frame));
     bst_assert_ok(&f->ctx, bst_frame_map(frame, &f->ctx, &pixels));
-    for (int i = 0; i < PIXELS; i++) {
+    for (int i = 0; i < window.width * window.height; i++) {
         electrons[i] = (pixels[i] - f->camera.offset_dn) * f->camera.gain_e_per_dn;
     }
     bst_frame_unmap(frame);
     bst_frame_release(frame);
     bst_renderer_free(renderer);
+}
+
+static void expose(fixture *f, double *electrons) {
+    expose_window(f, (bst_window){0, 0, WIDTH, HEIGHT}, electrons);
 }
 
 static void assert_frame(fixture *f, const double *want) {
@@ -106,6 +110,26 @@ static void crosstalk(void **state) {
     d->crosstalk = (bst_detector_crosstalk_config){0};
 }
 
+/* Pixels of a window are those of the whole frame, with the offsets of their rows. */
+static void rows_of_a_window(void **state) {
+    static double whole[PIXELS], part[PIXELS];
+    const bst_window windows[] = {{16, 50, 40, 27}, {0, 0, WIDTH, 9}, {3, 21, 5, 1}};
+    fixture *f = *state;
+    bst_detector_config *d = &f->camera.detector;
+    d->row_noise_e = d->flicker_noise_e = 9.0;
+    d->pick_up = (bst_detector_pick_up_config){7.0, 0.0, 0.013, NAN};
+    expose(f, whole);
+    for (int n = 0; n < 3; n++) {
+        const bst_window *w = &windows[n];
+        expose_window(f, *w, part);
+        for (int i = 0; i < w->width * w->height; i++) {
+            int x = w->x0 + i % w->width, y = w->y0 + i / w->width;
+            assert_true(part[i] == whole[y * WIDTH + x]);
+        }
+    }
+    d->row_noise_e = d->flicker_noise_e = d->pick_up.amplitude_e = 0.0;
+}
+
 static int open_device(void **state) {
     fixture *f = calloc(1, sizeof *f);
     *state = f;
@@ -133,6 +157,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(traps_along_rows),
         cmocka_unit_test(crosstalk),
+        cmocka_unit_test(rows_of_a_window),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
