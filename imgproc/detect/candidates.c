@@ -8,7 +8,11 @@
 
 enum {
     CELL_PX = 16,
-    SOON = 8 /* rows read ahead */
+    MOST_LANES = 16,      /* of a vector */
+    SOON = 8,             /* rows read ahead */
+    GATHER_ROWS = 16,     /* rows of cells per part of a loop */
+    GRAIN = 256,          /* least maxima per part of a loop */
+    PARTS_PER_THREAD = 4, /* of a crowded frame */
 };
 
 /* A maximum is one of its own if the output falls by this many sigma and this share of it towards
@@ -21,7 +25,9 @@ static void lay_out(bst_candidates *c, size_t cells) {
     BST_ARENA_TAKE(&c->arena, c->items, n);
     BST_ARENA_TAKE(&c->arena, c->order, n);
     BST_ARENA_TAKE(&c->arena, c->maxima, n);
-    BST_ARENA_TAKE(&c->arena, c->by_cell, n);
+    BST_ARENA_TAKE(&c->arena, c->cell_x, n + MOST_LANES); /* whole vectors are read */
+    BST_ARENA_TAKE(&c->arena, c->cell_y, n + MOST_LANES);
+    BST_ARENA_TAKE(&c->arena, c->cell_snr, n + MOST_LANES);
     BST_ARENA_TAKE(&c->arena, c->cell, cells);
     BST_ARENA_TAKE(&c->arena, c->stands, n);
     BST_ARENA_TAKE(&c->arena, c->order_swap, n);
@@ -57,9 +63,9 @@ typedef struct search {
     const void *user;
 } search;
 
-/* True if the SNR stays above `least` on the pixels nearest to the line between two maxima. */
-static bool is_ridge(const search *s, const bst_candidate *a, const bst_candidate *b, float least) {
-    int dx = b->x - a->x, dy = b->y - a->y;
+/* True if the SNR stays above `least` on the pixels nearest to the line between maximum `a` and one
+ * (dx, dy) pixels away. */
+static bool is_ridge(const search *s, const bst_candidate *a, int dx, int dy, float least) {
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
     float slope_x = (float)dx / (float)steps, slope_y = (float)dy / (float)steps;
     const float *map = s->map ? s->map + (long)a->y * s->f->stride + a->x : NULL;
@@ -76,14 +82,8 @@ static bool is_ridge(const search *s, const bst_candidate *a, const bst_candidat
     return true;
 }
 
-/* True if `other` is near and higher than `m`, or equal and earlier in row-major order.
- * Branch-free: branches would be unpredictable here. */
-static bool has_higher_neighbour(const search *s, const bst_candidate *m,
-                                 const bst_candidate *other) {
-    bool before = (other->y < m->y) | ((other->y == m->y) & (other->x < m->x));
-    bool higher = (other->snr > m->snr) | ((other->snr == m->snr) & before);
-    return higher & (abs(other->x - m->x) <= s->reach) & (abs(other->y - m->y) <= s->reach);
-}
+#define BST_SIMD_KERNELS "imgproc/detect/candidates_kernels.inc"
+#include "sim/core/simd_each.inc"
 
 /* True if no ridge connects a maximum to a higher one within reach: it is a source of its own. */
 static bool is_separate_source(const search *s, const bst_candidate *m) {
@@ -96,14 +96,12 @@ static bool is_separate_source(const search *s, const bst_candidate *m) {
     bottom = bottom < s->rows ? bottom : s->rows - 1;
     for (int v = m->y > s->reach ? (m->y - s->reach) / CELL_PX : 0; v <= bottom; v++) {
         int next = c->cell[v * c->columns + left], end = c->cell[v * c->columns + right + 1];
-        while (next < end) {
-            int some = end - next < A_TIME ? end : next + A_TIME, count = 0, near[A_TIME];
-            for (; next < some; next++) {
-                near[count] = next;
-                count += has_higher_neighbour(s, m, &c->by_cell[next]);
-            }
-            for (int k = 0; k < count; k++) {
-                if (is_ridge(s, m, &c->by_cell[near[k]], least)) {
+        for (; next < end; next += A_TIME) {
+            int some = end - next < A_TIME ? end - next : A_TIME;
+            uint32_t higher = BST_SIMD_PICK(higher_neighbours)(c, next, some, m, s->reach);
+            for (; higher != 0; higher &= higher - 1u) {
+                int k = next + __builtin_ctz(higher);
+                if (is_ridge(s, m, c->cell_x[k] - m->x, c->cell_y[k] - m->y, least)) {
                     return false;
                 }
             }
@@ -186,41 +184,70 @@ static void sort_items(bst_candidates *c) {
     }
 }
 
-/* Groups the maxima by cell of the frame (counting sort). */
-static void sort_by_cell(bst_candidates *c, int maxima, int cells) {
-    memset(c->cell, 0, ((size_t)cells + 1) * sizeof *c->cell);
-    for (int i = 0; i < maxima; i++) {
-        c->cell[c->maxima[i].y / CELL_PX * c->columns + c->maxima[i].x / CELL_PX + 1]++;
+/* Context of the loop that gathers the maxima. */
+typedef struct gathering {
+    bst_candidates *c;
+    const bst_filter *f;
+} gathering;
+
+/* Copies the maxima of rows of cells begin to end - 1 and groups them by cell (counting sort). The
+ * first cell of each row of cells holds the index of its first maximum before. */
+static void gather_rows(void *user, int begin, int end) {
+    const gathering *g = user;
+    const bst_filter *f = g->f;
+    bst_candidates *c = g->c;
+    for (int v = begin; v < end; v++) {
+        int *cell = c->cell + v * c->columns, first = cell[0], next = first;
+        int last = (v + 1) * CELL_PX < f->height ? (v + 1) * CELL_PX : f->height;
+        memset(cell, 0, (size_t)c->columns * sizeof *cell);
+        for (int y = v * CELL_PX; y < last; y++) {
+            size_t at = (size_t)y * (size_t)f->max_width;
+            if (y + SOON < f->height) { /* the maxima of successive rows lie far apart in memory */
+                __builtin_prefetch(f->maximum_x + at + (size_t)(SOON * f->max_width));
+                __builtin_prefetch(f->maximum_snr + at + (size_t)(SOON * f->max_width));
+            }
+            for (int i = 0; i < f->maxima[y]; i++) {
+                int x = f->maximum_x[at + (size_t)i];
+                c->maxima[next++] = (bst_candidate){x, y, f->maximum_snr[at + (size_t)i]};
+                cell[x / CELL_PX]++;
+            }
+        }
+        for (int u = 0, sum = first; u < c->columns; u++) {
+            sum += cell[u];
+            cell[u] = sum;
+        }
+        /* filled from the back: each cell's end becomes its first index */
+        for (int i = next - 1; i >= first; i--) {
+            int to = --cell[c->maxima[i].x / CELL_PX];
+            c->cell_x[to] = c->maxima[i].x;
+            c->cell_y[to] = c->maxima[i].y;
+            c->cell_snr[to] = c->maxima[i].snr;
+        }
     }
-    for (int k = 0; k < cells; k++) {
-        c->cell[k + 1] += c->cell[k];
+}
+
+/* Gathers the maxima of all rows, in row order and by cell; returns their number. */
+static int gather_maxima(bst_candidates *c, bst_parallel *pool, const bst_filter *f, int rows) {
+    gathering g = {c, f};
+    int maxima = 0;
+    for (int y = 0; y < f->height; y++) {
+        if (y % CELL_PX == 0) {
+            c->cell[y / CELL_PX * c->columns] = maxima;
+        }
+        maxima += f->maxima[y];
     }
-    /* filled from the back: each cell's first index ends at its place */
-    for (int i = maxima - 1; i >= 0; i--) {
-        int k = c->maxima[i].y / CELL_PX * c->columns + c->maxima[i].x / CELL_PX;
-        c->by_cell[--c->cell[k + 1]] = c->maxima[i];
-    }
-    memmove(c->cell, c->cell + 1, (size_t)cells * sizeof *c->cell);
-    c->cell[cells] = maxima;
+    c->cell[c->columns * rows] = maxima;
+    /* few maxima are gathered before another thread wakes */
+    bst_parallel_for(pool, rows, f->crowded ? GATHER_ROWS : rows, gather_rows, &g);
+    return maxima;
 }
 
 void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter *f,
                          const bst_candidates_criteria *criteria) {
     assert(c && f && criteria && f->width > 0 && f->height > 0);
-    int maxima = 0, rows = (f->height + CELL_PX - 1) / CELL_PX;
+    int rows = (f->height + CELL_PX - 1) / CELL_PX;
     c->columns = (f->width + CELL_PX - 1) / CELL_PX;
-    for (int y = 0; y < f->height; y++) {
-        size_t at = (size_t)y * (size_t)f->max_width;
-        if (y + SOON < f->height) { /* the maxima of successive rows lie far apart in memory */
-            __builtin_prefetch(f->maximum_x + at + (size_t)(SOON * f->max_width));
-            __builtin_prefetch(f->maximum_snr + at + (size_t)(SOON * f->max_width));
-        }
-        for (int i = 0; i < f->maxima[y]; i++) {
-            c->maxima[maxima++] =
-                (bst_candidate){f->maximum_x[at + (size_t)i], y, f->maximum_snr[at + (size_t)i]};
-        }
-    }
-    sort_by_cell(c, maxima, c->columns * rows);
+    int maxima = gather_maxima(c, pool, f, rows);
     const float *map = !f->streak ? f->point : f->kept ? f->best : NULL;
     map = map ? map + (long)f->pad * f->stride + f->pad : NULL;
     search s = {c,
@@ -232,8 +259,9 @@ void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter
                 criteria->certain,
                 criteria->accept,
                 criteria->user};
-    /* long parts if each reads the rows about it */
-    bst_parallel_for(pool, maxima, f->crowded ? 1024 : 256, select_candidates, &s);
+    /* few parts if each reads the rows about it, because the rows at a border are read twice */
+    int share = f->crowded ? maxima / (PARTS_PER_THREAD * bst_parallel_threads(pool)) : 0;
+    bst_parallel_for(pool, maxima, share > GRAIN ? share : GRAIN, select_candidates, &s);
     c->count = 0;
     for (int i = 0; i < maxima; i++) {
         if (c->stands[i]) {

@@ -16,8 +16,10 @@ typedef struct bst_candidates {
     bst_candidate *items;
     int *order; /* indices of items: falling SNR, then y, then x */
     int count, capacity;
-    /* all maxima: in row order, and grouped by cell of the frame */
-    bst_candidate *maxima, *by_cell;
+    bst_candidate *maxima; /* all maxima in row order */
+    /* the same grouped by cell of the frame */
+    int32_t *cell_x, *cell_y;
+    float *cell_snr;
     int *cell;   /* index of the first maximum of each cell */
     int columns; /* cells per row of the latest frame */
     /* [maxima]: 1: it is a candidate */

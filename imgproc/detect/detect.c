@@ -354,7 +354,6 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
     sigma = fmax(sigma / frame->binning, 0.2);
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
-
     const uint8_t *bad = ip->bad;
     if (frame == whole && ip->config.extended.enabled) {
         bad = bst_imgproc_find_silhouettes(ip, frame, motion, sigma, saturation_dn(ip, frame));
@@ -387,15 +386,16 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
     double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
     int saturated_dn = saturation_dn(ip, frame);
-    const bst_filter_input input = {.background = &ip->background,
-                                    .read = bst_calibrate_pixels_read,
-                                    .user = read,
-                                    .raw = frame->pixels,
-                                    .gain = plain,
-                                    .signal = ip->electrons,
-                                    .width = width,
-                                    .height = height,
-                                    .saturated_dn = saturated_dn};
+    bst_filter_input input = {.background = &ip->background,
+                              .read = bst_calibrate_pixels_read,
+                              .user = read,
+                              .raw = frame->pixels,
+                              .gain = plain,
+                              .signal = ip->electrons,
+                              .width = width,
+                              .height = height,
+                              .saturated_dn = saturated_dn,
+                              .provisional = !ip->smeared};
     bst_filter_run(&ip->filter, pool, &input, (float)interpolation_threshold(ip, threshold));
     if (ip->filter.crowded && !ip->smeared) {
         ground.read = read_star_masked;
@@ -404,6 +404,7 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
         /* no false alarms are expected on masked stars */
         pixels *= fmax(share, LEAST_OPEN);
         threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
+        input.provisional = false;
         bst_filter_run(&ip->filter, pool, &input, (float)interpolation_threshold(ip, threshold));
     }
     double look = interpolation_threshold(ip, threshold);

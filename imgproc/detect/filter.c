@@ -106,9 +106,10 @@ typedef struct pass {
     const bst_row_gain *gain; /* NULL: electrons are read by `read` */
     float *signal;
     int saturated_dn, part_rows;
-    int reach;       /* half height of the streak's taps, rows */
-    bool past_cache; /* frame larger than the cache */
-    bool apart;      /* streak-map rows are discarded once their maxima are found */
+    int reach;        /* half height of the streak's taps, rows */
+    bool provisional; /* the signal is stored only if the frame is not crowded */
+    bool past_cache;  /* frame larger than the cache */
+    bool apart;       /* streak-map rows are discarded once their maxima are found */
     float threshold;
 } pass;
 
@@ -121,6 +122,10 @@ static float *map_row(const bst_filter *f, float *map, int y) {
 static void note_maxima(bst_filter *f, int y, const float *above, const float *row,
                         const float *below, float threshold) {
     size_t at = (size_t)y * (size_t)f->max_width;
+    if (y + 1 < f->height) { /* the maxima of successive rows lie far apart in memory */
+        __builtin_prefetch(f->maximum_x + at + (size_t)f->max_width, 1);
+        __builtin_prefetch(f->maximum_snr + at + (size_t)f->max_width, 1);
+    }
     f->maxima[y] = bst_row_maxima(above, row, below, f->width, threshold, f->maximum_x + at,
                                   f->maximum_snr + at);
 }
@@ -153,6 +158,24 @@ static void normalise_edges(const bst_filter *f, int y, float *row) {
     }
 }
 
+/* Signal of row y, and its normalised signal at lines + radius. */
+static void read_row(const pass *p, int y, float *lines, float *signal) {
+    const bst_filter *f = p->f;
+    int width = f->width, r = f->radius;
+    size_t row = (size_t)y * (size_t)width, line = (size_t)f->stride;
+    float *normalised = lines, *electrons = lines + line;
+    bst_row_part *parts = (bst_row_part *)(void *)(lines + 3 * line);
+    if (!p->gain) {
+        p->read(p->user, y, 0, width, electrons);
+    }
+    const bst_row_input pixels = {p->raw + row, p->gain, electrons, p->saturated_dn};
+    bst_row_normalise(&pixels, parts, bst_background_parts(p->background, y, parts), signal,
+                      normalised + r);
+    if (f->correct_row) {
+        f->correct_row(f->correct_user, y, width, signal, normalised + r);
+    }
+}
+
 /* Filters one row horizontally; own: also stores its signal. */
 static void filter_horizontal(const pass *p, int y, bool own, float *lines, float *out) {
     const bst_filter *f = p->f;
@@ -164,18 +187,8 @@ static void filter_horizontal(const pass *p, int y, bool own, float *lines, floa
         }
         return;
     }
-    float *normalised = lines, *electrons = lines + line;
-    float *signal = own ? p->signal + row : lines + 2 * line;
-    bst_row_part *parts = (bst_row_part *)(void *)(lines + 3 * line);
-    if (!p->gain) {
-        p->read(p->user, y, 0, width, electrons);
-    }
-    const bst_row_input pixels = {p->raw + row, p->gain, electrons, p->saturated_dn};
-    bst_row_normalise(&pixels, parts, bst_background_parts(p->background, y, parts), signal,
-                      normalised + r);
-    if (f->correct_row) {
-        f->correct_row(f->correct_user, y, width, signal, normalised + r);
-    }
+    const float *normalised = lines;
+    read_row(p, y, lines, own && !p->provisional ? p->signal + row : lines + 2 * line);
     const float *in[2 * BST_FILTER_MAX_RADIUS + 1];
     for (int x = 0; x < width; x += SOON_PX) {
         int count = width - x < SOON_PX ? width - x : SOON_PX;
@@ -276,6 +289,18 @@ static void filter_rows(void *user, int begin, int end) {
                 }
             }
         }
+    }
+    bst_scratch_pool_give(f->lent, taken);
+}
+
+/* Stores the signal of rows begin to end - 1. */
+static void keep_signal(void *user, int begin, int end) {
+    const pass *p = user;
+    const bst_filter *f = p->f;
+    int taken = bst_scratch_pool_take(f->lent);
+    for (int y = begin; y < end; y++) {
+        read_row(p, y, f->lines + f->line_floats * (size_t)taken,
+                 p->signal + (size_t)y * (size_t)f->width);
     }
     bst_scratch_pool_give(f->lent, taken);
 }
@@ -382,6 +407,7 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_filter_input *i
               .saturated_dn = input->saturated_dn,
               .part_rows = rows,
               .reach = reach,
+              .provisional = input->provisional && f->crowded,
               .past_cache = past_cache,
               .apart = f->streak && past_cache && f->taps <= FEW_TAPS && !f->crowded,
               .threshold = threshold};
@@ -392,6 +418,9 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_filter_input *i
     }
     bst_parallel_for(pool, height, rows, p.apart ? finish_maxima_transient : finish_maxima, &p);
     f->crowded = is_crowded(f);
+    if (p.provisional && !f->crowded) {
+        bst_parallel_for(pool, height, rows, keep_signal, &p);
+    }
     if (p.apart && f->crowded) {
         bst_parallel_for(pool, height, rows, keep_streaks, &p);
         f->kept = true;

@@ -127,6 +127,8 @@ typedef struct bst_filter_input {
     int width, height;
     /* raw value from which a pixel is saturated: its signal becomes BST_PIXEL_SATURATED */
     int saturated_dn;
+    /* a crowded frame is filtered again: `signal` is then undefined if the filter ends `crowded` */
+    bool provisional;
 } bst_filter_input;
 
 /* Filters a frame: subtracts the background, computes the SNR maps and finds the maxima above the

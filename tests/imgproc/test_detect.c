@@ -448,10 +448,18 @@ static void crowded_field(void **state) {
     end(&f);
 }
 
-/* The same frame gives the same bytes, from another work space and after other frames. */
+/* The same frame gives the same bytes, from another work space and after other frames; one of them
+ * is crowded, after which the signal is at first not stored. */
 static void same_input_same_bytes(void **state) {
     (void)state;
     fixture a = begin(300, 200), b = begin(300, 200);
+    for (int i = 0; i < 1000; i++) {
+        synthetic_add(&a.s, 300 * bst_rng_uniform(a.key, 6, (uint64_t)i),
+                      200 * bst_rng_uniform(a.key, 7, (uint64_t)i), 4000, 0, 0);
+    }
+    expose(&a, NULL);
+    assert_true(a.d->count + a.d->lost > 300 * 200 / 400); /* the limit of a crowd */
+    synthetic_clear(&a.s);
     bst_camera_motion motion = synthetic_motion(&a.s, 6, -3);
     for (int i = 0; i < 60; i++) {
         double x = 300 * bst_rng_uniform(a.key, 2, (uint64_t)i);
