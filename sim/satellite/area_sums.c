@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "sim/core/pages.h"
+#include "sim/core/simd.h"
 
 /* Light below that share of the brightest cell is rounding. */
 static const double LEAST = 1e-9;
@@ -15,27 +16,6 @@ void bst_area_sums_free(bst_area_sums *s) {
     free(s->cells);
     free(s->second);
     *s = (bst_area_sums){.width = 0};
-}
-
-bst_status bst_area_sums_begin(bst_ctx *ctx, bst_area_sums *s, int width, int height) {
-    size_t need = ((size_t)width + 1) * (size_t)height;
-    if (need > s->capacity) {
-        free(s->cells);
-        free(s->second);
-        size_t capacity = need + need / 4; /* as those of the image */
-        s->cells = bst_pages_alloc(capacity * sizeof *s->cells);
-        s->second = bst_pages_alloc(capacity * sizeof *s->second);
-        s->capacity = s->cells && s->second ? capacity : 0;
-        if (s->capacity == 0) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an image of %d x %d cells", width,
-                            height);
-        }
-    }
-    s->width = width;
-    s->height = height;
-    memset(s->cells, 0, need * sizeof *s->cells);
-    memset(s->second, 0, need * sizeof *s->second);
-    return BST_OK;
 }
 
 /* A row of cells: column 0, with one before it for what is left of the image. `second` is NULL for
@@ -137,101 +117,41 @@ static inline void add_in_row(const row *r, const double x[2], const double y[2]
     add_across(r, x, y, slope, light);
 }
 
-/* Two numbers, and four sums of a cell: row_y, light, x and y. */
-typedef double pair __attribute__((vector_size(16)));
-typedef float pair_f __attribute__((vector_size(8)));
+/* Four sums of a cell: row_y, light, x and y, or its second moments. */
 typedef float sums4 __attribute__((vector_size(16)));
 
-static inline void add_sums(bst_area_cell *c, sums4 more, double dy) {
+/* Adds to four sums from `to` on. */
+BST_SIMD_INLINE void add_four(float *to, const sums4 *more) {
     sums4 sums;
-    memcpy(&sums, &c->row_y, sizeof sums);
-    sums += more;
-    memcpy(&c->row_y, &sums, sizeof sums);
-    c->row_light += dy;
+    memcpy(&sums, to, sizeof sums);
+    sums += *more;
+    memcpy(to, &sums, sizeof sums);
 }
 
-/* Two parts of an edge, from (x0, y0) to (x1, y1) from the centres of their cells. */
-typedef struct parts {
-    pair x0, y0, x1, y1;
-} parts;
+#define BST_SIMD_KERNELS "sim/satellite/area_edge_kernels.inc"
+#include "sim/core/simd_each.inc"
 
-/* Adds them at once, as add_part: to cell `at` and to cell `next`. `second`: see row. */
-static inline void add_parts(bst_area_cell *cells, bst_area_second *second, size_t at, size_t next,
-                             parts p, double light) {
-    pair x = 0.5 * (p.x0 + p.x1), y = 0.5 * (p.y0 + p.y1), wide = p.x1 - p.x0, high = p.y1 - p.y0;
-    pair dy = light * high, x2 = wide * wide * (1.0 / 12.0), right = 0.5 - x;
-    pair xy = wide * high * (1.0 / 12.0), across = 0.5 * (0.25 - x * x - x2);
-    pair_f row_y = __builtin_convertvector(dy * y, pair_f);
-    pair_f own = __builtin_convertvector(dy * right, pair_f);
-    pair_f to_x = __builtin_convertvector(dy * across, pair_f);
-    pair_f to_y = __builtin_convertvector(dy * (y * right - xy), pair_f);
-    add_sums(&cells[at], (sums4){row_y[0], own[0], to_x[0], to_y[0]}, dy[0]);
-    add_sums(&cells[next], (sums4){row_y[1], own[1], to_x[1], to_y[1]}, dy[1]);
-    if (second) {
-        pair yy = y * y + (high * high - 1.0) * (1.0 / 12.0), even = right * (1.0 / 12.0);
-        pair row_yy = dy * yy, to_xy = dy * (y * across - x * xy);
-        pair to_xx = dy * ((1.0 / 3.0) * (0.125 - x * (x * x + 3.0 * x2)) - even);
-        pair to_yy = dy * (yy * right - 2.0 * y * xy);
-        for (int k = 0; k < 2; k++) {
-            bst_area_second *q = &second[k == 0 ? at : next];
-            q->row_yy += (float)row_yy[k];
-            q->xx += (float)to_xx[k];
-            q->xy += (float)to_xy[k];
-            q->yy += (float)to_yy[k];
+bst_status bst_area_sums_begin(bst_ctx *ctx, bst_area_sums *s, int width, int height) {
+    size_t need = ((size_t)width + 1) * (size_t)height;
+    if (need > s->capacity) {
+        free(s->cells);
+        free(s->second);
+        size_t capacity = need + need / 4; /* as those of the image */
+        s->cells = bst_pages_alloc(capacity * sizeof *s->cells);
+        s->second = bst_pages_alloc(capacity * sizeof *s->second);
+        s->capacity = s->cells && s->second ? capacity : 0;
+        if (s->capacity == 0) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an image of %d x %d cells", width,
+                            height);
         }
     }
-}
-
-/* Adds an edge, a.y < b.y, that stays within the grid without its last column and row. Without
- * branches that depend on where it leaves a cell: in each row a steep edge meets at most two cells,
- * as a flat one does in each column; without the second one its part there has no length.
- *
- * Given:     along  1: to the right; -1: to the left */
-static inline void add_edge_within(bst_area_sums *s, bst_point2 a, bst_point2 b, double light,
-                                   bool second, int along) {
-    double wide = b.x - a.x, high = b.y - a.y, slope = wide / high, steep = high / wide;
-    size_t stride = (size_t)s->width + 1, step = along > 0 ? 1 : SIZE_MAX;
-    int i = (int)a.x, j = (int)a.y;
-    double x = a.x, y = a.y;
-    if (along * wide <= high) {
-        for (int rows = (int)b.y - j; rows >= 0; rows--, j++) {
-            double y_next = rows > 0 ? j + 1.0 : b.y;
-            double x_next = rows > 0 ? a.x + (y_next - a.y) * slope : b.x;
-            i = (int)x;
-            double side = along > 0 ? i + 1.0 : i;
-            side = along > 0 ? (side < x_next ? side : x_next) : (side > x_next ? side : x_next);
-            /* not by the slope in the same cell: of edges along y it is rounding */
-            double y_side = side != x_next ? y + (side - x) * steep : y_next;
-            y_side = y_side < y_next ? y_side : y_next;
-            pair cx = {i + 0.5, i + along + 0.5};
-            double cy = j + 0.5;
-            size_t at = (size_t)j * stride + (size_t)i + 1;
-            const parts both = {(pair){x, side} - cx, (pair){y, y_side} - cy,
-                                (pair){side, x_next} - cx, (pair){y_side, y_next} - cy};
-            add_parts(s->cells, second ? s->second : NULL, at, at + step, both, light);
-            x = x_next;
-            y = y_next;
-        }
-        return;
-    }
-    for (int columns = ((int)b.x - i) * along; columns >= 0; columns--, i += along) {
-        double x_next = columns > 0 ? (along > 0 ? i + 1.0 : i) : b.x;
-        double y_next = columns > 0 ? a.y + (x_next - a.x) * steep : b.y;
-        y_next = y_next < y ? y : y_next > b.y ? b.y : y_next; /* by rounding */
-        j = (int)y;
-        double side = j + 1.0 < y_next ? j + 1.0 : y_next;
-        double x_side = x + (side - y) * slope;
-        x_side =
-            along > 0 ? (x_side < x_next ? x_side : x_next) : (x_side > x_next ? x_side : x_next);
-        pair cy = {j + 0.5, j + 1.5};
-        double cx = i + 0.5;
-        size_t at = (size_t)j * stride + (size_t)i + 1;
-        const parts both = {(pair){x, x_side} - cx, (pair){y, side} - cy,
-                            (pair){x_side, x_next} - cx, (pair){side, y_next} - cy};
-        add_parts(s->cells, second ? s->second : NULL, at, at + stride, both, light);
-        x = x_next;
-        y = y_next;
-    }
+    s->width = width;
+    s->height = height;
+    s->add_inner[0] = BST_SIMD_PICK(add_faint_edge);
+    s->add_inner[1] = BST_SIMD_PICK(add_inner_edge);
+    memset(s->cells, 0, need * sizeof *s->cells);
+    memset(s->second, 0, need * sizeof *s->second);
+    return BST_OK;
 }
 
 static inline void add_edge(bst_area_sums *s, bst_point2 a, bst_point2 b, double light,
@@ -245,16 +165,13 @@ static inline void add_edge(bst_area_sums *s, bst_point2 a, bst_point2 b, double
     if (!(b.y > 0.0) || !(a.y < s->height) || a.y == b.y) {
         return;
     }
+    double slope = (b.x - a.x) / (b.y - a.y), steep = (b.y - a.y) / (b.x - a.x);
     double low = a.x < b.x ? a.x : b.x, high = a.x < b.x ? b.x : a.x;
     if (low >= 1.0 && high < s->width - 1.0 && a.y >= 0.0 && b.y < s->height - 1.0) {
-        if (b.x >= a.x) {
-            add_edge_within(s, a, b, light, second, 1);
-        } else {
-            add_edge_within(s, a, b, light, second, -1);
-        }
+        const bst_area_edge e = {a, b, slope, steep, light};
+        s->add_inner[second](s, &e);
         return;
     }
-    double slope = (b.x - a.x) / (b.y - a.y), steep = (b.y - a.y) / (b.x - a.x);
     double x = a.x, y = a.y;
     if (y < 0.0) {
         x -= y * slope;

@@ -17,12 +17,20 @@ typedef struct bst_area_second {
     float row_yy, xx, xy, yy;
 } bst_area_second;
 
+/* An edge that stays within the grid without its last column and row, a.y < b.y. */
+typedef struct bst_area_edge {
+    bst_point2 a, b;
+    double slope, steep, light; /* of x over y; of y over x; of a cell */
+} bst_area_edge;
+
 /* A grid of sums; zero-initialise, free with bst_area_sums_free. */
 typedef struct bst_area_sums {
     bst_area_cell *cells;    /* [height][width + 1], from the column before the first one on */
     bst_area_second *second; /* likewise */
     int width, height;
     size_t capacity;
+    /* adds such an edge on this processor: [0] without second moments */
+    void (*add_inner[2])(struct bst_area_sums *sums, const bst_area_edge *edge);
 } bst_area_sums;
 
 /* Frees the memory. */

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "sim/core/simd.h"
 #include "sim/satellite/facet_layers.h"
 #include "sim/satellite/facet_net.h"
 #include "sim/satellite/resolved_image.h"
@@ -503,6 +504,41 @@ static void test_faint_edges(void **state) {
     bst_satellite_free(satellite);
 }
 
+/* Edges are added some rows at a time, more with wider vectors: the same bytes for all widths, with
+ * second moments, without those of faint edges, and where the image ends within the body. */
+static void test_vector_widths(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_satellite *satellite = bumpy_sphere(false);
+    bst_satellite_pose *pose;
+    bst_resolved_gain gain[1] = {{.sun = 1.0}};
+    bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.3, 0.2, -1.0}), .gain = gain};
+    bst_resolved_view view = {bst_quat_look((bst_vec3){0.2, 0.1, 1.0}, (bst_vec3){1, 0.3, 0}),
+                              {0, 0, 20.0},
+                              0.0007,
+                              0.0,
+                              0.0,
+                              NULL};
+    bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
+    for (int n = 0; n < 4; n++) {
+        way by = n % 2 == 0 ? BY_AREAS : BY_BLURRED_AREAS;
+        bst_simd_limit(4);
+        bst_resolved *narrow = draw_within(pose, &view, &light, by, n < 2 ? 0.0 : 0.3);
+        bst_simd_limit(16);
+        bst_resolved *wide = draw_within(pose, &view, &light, by, n < 2 ? 0.0 : 0.3);
+        const bst_resolved_image *a = bst_resolved_image_of(narrow);
+        const bst_resolved_image *b = bst_resolved_image_of(wide);
+        size_t count = (size_t)a->width * (size_t)a->height;
+        assert_true(count > 900 && b->width == a->width && b->height == a->height);
+        assert_memory_equal(a->cells, b->cells, count * sizeof *a->cells);
+        assert_memory_equal(a->second, b->second, count * sizeof *a->second);
+        bst_resolved_free(narrow);
+        bst_resolved_free(wide);
+    }
+    bst_satellite_pose_free(pose);
+    bst_satellite_free(satellite);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_bumps),
                                        cmocka_unit_test(test_facets_through_others),
@@ -512,6 +548,7 @@ int main(void) {
                                        cmocka_unit_test(test_border_across_border),
                                        cmocka_unit_test(test_crossing_facets),
                                        cmocka_unit_test(test_hidden_by_crossing_facet),
-                                       cmocka_unit_test(test_faint_edges)};
+                                       cmocka_unit_test(test_faint_edges),
+                                       cmocka_unit_test(test_vector_widths)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
