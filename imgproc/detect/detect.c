@@ -430,8 +430,7 @@ static void locate_candidates(bst_imgproc *ip, const part *p, bst_detections *ou
     int kept = 0, room = capacity - out->count;
     room = room < ip->locator.capacity ? room : ip->locator.capacity;
     /* of the candidates those beyond the capacity; a candidate may become two sources */
-    const int beyond = ip->candidates.count - ip->locator.capacity;
-    int lost = beyond > 0 ? beyond : 0;
+    int lost = (int)fmax(ip->candidates.count - ip->locator.capacity, 0.0);
     if (p->search) {
         bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, p->false_alarms, &ip->locator);
     }
