@@ -94,7 +94,7 @@ static bst_sgp4_error move_mean(const bst_sgp4 *s, double t, bst_sgp4_mean *x, d
                          .argp = s->argp0 + s->argp_rate * t,
                          .raan = s->raan0 + t * (s->raan_rate + t * s->raan_drag)};
     double root_a_ratio, e_loss = 0.0, l_gain;
-    if (s->middle && !s->deep_space) {
+    if (s->middle) {
         displace_as_middle(s, t, x);
     } else {
         const apsides_drag drag = drag_of_apsides(s, t, x->m);

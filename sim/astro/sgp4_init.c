@@ -172,7 +172,6 @@ static bst_status create(bst_ctx *ctx, const bst_elements *elements, const bst_s
     }
     s->gravity = gravity;
     s->k = make_constants(gravity);
-    s->middle = middle;
     s->afspc = mode == BST_SGP4_AFSPC;
     s->e0 = el->eccentricity;
     s->i0 = el->inclination_rad;
@@ -186,6 +185,7 @@ static bst_status create(bst_ctx *ctx, const bst_elements *elements, const bst_s
         return refuse(ctx, el, BST_SGP4_MEAN_MOTION);
     }
     s->deep_space = BST_SGP4_TWO_PI / s->n0 >= DEEP_SPACE_PERIOD_MIN;
+    s->middle = s->deep_space ? NULL : middle; /* those have no such displacement */
     bst_sgp4_set_plane(&s->k, sin(s->i0), cos_i, &s->plane);
     set_secular_rates(s);
     set_drag(s, el->bstar);
