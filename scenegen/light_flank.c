@@ -5,7 +5,9 @@
 
 /* Light of a step over the dark variance: octaves of equal steps, so that frexp finds them. */
 static double light_of(int step) {
-    double octave = ldexp(1.0, BST_FLANK_FIRST + step / BST_FLANK_PARTS);
+    _Static_assert(BST_FLANK_FIRST + BST_FLANK_OCTAVES < 63, "octaves are parts of 2^62");
+    const double least = 1.0 / (double)(1LL << -BST_FLANK_FIRST);
+    double octave = least * (double)(1LL << step / BST_FLANK_PARTS);
     return octave * (1.0 + (double)(step % BST_FLANK_PARTS) / BST_FLANK_PARTS);
 }
 

@@ -247,8 +247,11 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
     bool coloured = fourier && bst_fourier_render_spectra(fourier) > 1;
     BST_TRY(reserve(ctx, p, q->count, coloured, bst_smear_has_threads(smear)));
     for (int i = 0; i < q->count; i++) {
-        bool star = !q->sources[i].path && !q->sources[i].ghost; /* on the stars' track */
-        brightest = star ? fmax(brightest, q->sources[i].electrons_per_s) : brightest;
+        /* few sources are brighter than all before: of the others only one member is read */
+        const bst_scene_source *source = &q->sources[i];
+        if (source->electrons_per_s > brightest && !source->path && !source->ghost) {
+            brightest = source->electrons_per_s; /* a source on the stars' track */
+        }
     }
     double least_e = q->background_e + (q->background ? q->background->least_e : 0.0);
     int binning = q->binning > 1 ? q->binning : 1;

@@ -350,18 +350,24 @@ double bst_smear_allowed(const bst_smear *s, double peak_e) {
            fmax(peak_e, 1e-9);
 }
 
-int bst_smear_choose_level(const bst_smear *s, double scale) {
-    double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
+/* Coarsest level whose error is probably at most `allowed`, for an image that moves by `scale` of
+ * the path. */
+static int first_level(const bst_smear *s, double scale, double allowed) {
     int n = 0;
     if (s->options.temporal_oversample > 0) {
         return n;
     }
     /* mostly three nodes per group: sixth-order errors, for motions up to the path's */
-    double power = scale * scale * scale, part = fmin(power * power, 1.0);
+    double power = scale * scale * scale, part = power * power;
+    part = part < 1.0 ? part : 1.0;
     while (n + 1 < BST_SMEAR_LEVELS && part * s->tolerance[n] + s->point_error > allowed) {
         n++;
     }
     return n;
+}
+
+int bst_smear_choose_level(const bst_smear *s, double scale) {
+    return first_level(s, scale, NODE_SHARE * bst_smear_allowed(s, s->last_read_e));
 }
 
 /* Error bound of a level for stars of a cell (NULL: of all stars), cached in the cell. */
@@ -402,7 +408,7 @@ static double star_prediction(const bst_smear *s, int n, bst_smear_star_motion_c
 static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_cell *cell,
                              const bst_smear_level **out, double *error, double *predicted) {
     double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
-    int n = bst_smear_choose_level(s, cell ? cell->scale : 1.0);
+    int n = first_level(s, cell ? cell->scale : 1.0, allowed);
     BST_TRY(bst_smear_make_level(ctx, s, n));
     *error = star_error(s, n, cell);
     while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 && *error > allowed) {
@@ -424,8 +430,11 @@ static int choose_radius(const bst_smear *s, double peak_e) {
 /* Radius of the latest source's stamp; nodes of a ghost are wider than the PSF. */
 static int radius_of(const bst_smear *s, const bst_scene_source *source) {
     int radius = choose_radius(s, s->last_peak_e * s->binning);
+    if (!source->ghost) {
+        return radius;
+    }
     double wide = radius * sqrt(1.0 + s->last_widening_px2 / (s->sigma_px * s->sigma_px));
-    return source->ghost ? (int)fmin(ceil(wide), s->options.taps / 2 - 1) : radius;
+    return (int)fmin(ceil(wide), s->options.taps / 2 - 1);
 }
 
 bool bst_smear_project(const bst_smear *s, const bst_scene_source *source, bst_quat q, bst_vec3 v,

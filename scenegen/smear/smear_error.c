@@ -146,27 +146,26 @@ static double pattern_flank(const bst_smear *s, const bst_smear_drawn *drawn, in
  * beside the peak there is less noise, but not always less error. Along a path there is more light
  * than beside a point, where the path rests as a point. bound: of a Gaussian much wider than its
  * pixels. */
-static double flank_of(const bst_smear *s, const bst_smear_drawn *d, double bound) {
+static double flank_of(const bst_smear *s, const bst_smear_drawn *d, bst_flank_place place,
+                       double bound) {
     double wide = d->high[0] - d->low[0], high = d->high[1] - d->low[1],
            streak = BST_STREAK_SIGMAS * s->sigma_px;
     bool moves = wide * wide + high * high >= streak * streak && !d->level->rests;
     int f = moves ? BST_FLANK_STREAK : BST_FLANK_POINT;
-    double light = s->last_read_e / s->dark_variance_e2;
-    return s->sensitivity ? pattern_flank(s, d, f, bst_flank_place_of(light))
-                          : fmax(bst_flank_curve_at(&s->flanks[f], light), bound);
+    return s->sensitivity ? pattern_flank(s, d, f, place)
+                          : fmax(bst_flank_curve_value(&s->flanks[f], place), bound);
 }
 
 /* The same of the error of profiles, which widens a point along x and y: by the steps of the grid's
  * phases, and of the widths. */
-static double profile_flank_of(const bst_smear *s, double bound) {
+static double profile_flank_of(const bst_smear *s, bst_flank_place place, double bound) {
     enum { ALONG_X = 0, ALONG_Y = BST_NODE_DIRECTIONS / 2, SECOND_ORDER = 0 };
-    double light = s->last_read_e / s->dark_variance_e2;
     if (!s->sensitivity) {
-        return fmax(bst_flank_curve_at(&s->flanks[BST_FLANK_POINT], light), bound);
+        return fmax(bst_flank_curve_value(&s->flanks[BST_FLANK_POINT], place), bound);
     }
     const bst_flank_curve(*of)[3] = s->sensitivity->flank[BST_FLANK_POINT];
-    return fmax(bst_flank_curve_at(&of[ALONG_X][SECOND_ORDER], light),
-                bst_flank_curve_at(&of[ALONG_Y][SECOND_ORDER], light));
+    return fmax(bst_flank_curve_value(&of[ALONG_X][SECOND_ORDER], place),
+                bst_flank_curve_value(&of[ALONG_Y][SECOND_ORDER], place));
 }
 
 /* Sets the image errors of a source at (x, y), wherever it falls. */
@@ -184,6 +183,7 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
                         ? bst_smear_single_error(s, peak_e, sqrt(d->x * d->x + d->y * d->y))
                         : 0.0;
     double sigma_e = sqrt(peak_e + s->dark_variance_e2);
+    bst_flank_place place = bst_flank_place_of(peak_e / s->dark_variance_e2);
     double flank = sigma_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
     /* a border crosses a read-out pixel along its side at most */
     double tail = s->stamp.tail[border] * s->binning;
@@ -192,8 +192,8 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
         .y_px = (float)d->y,
         .peak_e = (float)peak_e,
         .nodes_e = (float)((flank * error + rounded) * peak_e + s->body_sigma * sigma_e),
-        .predicted_e = (float)((flank_of(s, d, flank) * predicted +
-                                profile_flank_of(s, flank) * profile + rounded) *
+        .predicted_e = (float)((flank_of(s, d, place, flank) * predicted +
+                                profile_flank_of(s, place, flank) * profile + rounded) *
                                    peak_e +
                                s->body_sigma * sigma_e),
         .shared_e = (float)(shared * sigma_e),

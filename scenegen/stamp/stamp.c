@@ -1,6 +1,7 @@
 #include "scenegen/stamp/stamp.h"
 
 #include <assert.h>
+#include <math.h>
 
 #include "scenegen/reference.h"
 
@@ -23,6 +24,9 @@ void bst_stamp_init(bst_stamp *stamp, double sigma_px, bool whole) {
         stamp->tail[r] = whole ? 0.0 : bst_reference_pixel_share(0.0, sigma_px, r) / centre;
         stamp->kept[r] = whole ? 1.0 : kept_light(sigma_px, r);
     }
+    for (int r = 0; r + 1 < BST_PLACE_TAPS / 2; r++) {
+        stamp->missed[r] = fmax(stamp->tail[r + 1], bst_stamp_excess(stamp, r));
+    }
 }
 
 double bst_stamp_excess(const bst_stamp *stamp, int radius) {
@@ -31,7 +35,7 @@ double bst_stamp_excess(const bst_stamp *stamp, int radius) {
 
 int bst_stamp_radius(const bst_stamp *stamp, double peak_e, double limit_e, int most) {
     int r = 1;
-    while (r < most && peak_e * fmax(stamp->tail[r + 1], bst_stamp_excess(stamp, r)) > limit_e) {
+    while (r < most && peak_e * stamp->missed[r] > limit_e) {
         r++;
     }
     return r;

@@ -10,6 +10,8 @@ typedef struct bst_stamp {
     double tail[BST_PLACE_TAPS / 2]; /* profile at r px from the centre, relative to the centre */
     /* light within the two nearest pixels and r more on each side */
     double kept[BST_PLACE_TAPS / 2];
+    /* the larger of the light beyond a stamp and the excess within it, relative to the peak */
+    double missed[BST_PLACE_TAPS / 2 - 1];
 } bst_stamp;
 
 /* Sets the tables for a Gaussian; `whole`: for a PSF whose light is not truncated. */
