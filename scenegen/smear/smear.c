@@ -13,8 +13,7 @@
 #include "scenegen/stamp/profile_law.h"
 #include "sim/core/invariant.h"
 
-/* Shares of the tolerance: for nodes, for the stamp border, and for a track shared by the stars. */
-#define NODE_SHARE 0.85
+/* Shares of the tolerance: for the stamp border, and for a track shared by the stars. */
 #define CUT_SHARE 0.3
 #define SINGLE_SHARE 0.1
 
@@ -345,31 +344,6 @@ void bst_smear_refine_grid(bst_smear *s, double per_px) {
     s->grid_per_px = per_px;
 }
 
-double bst_smear_allowed(const bst_smear *s, double peak_e) {
-    return s->aim * s->options.tolerance_sigma * sqrt(FLANK * peak_e + s->dark_variance_e2) /
-           fmax(peak_e, 1e-9);
-}
-
-/* Coarsest level whose error is probably at most `allowed`, for an image that moves by `scale` of
- * the path. */
-static int first_level(const bst_smear *s, double scale, double allowed) {
-    int n = 0;
-    if (s->options.temporal_oversample > 0) {
-        return n;
-    }
-    /* mostly three nodes per group: sixth-order errors, for motions up to the path's */
-    double power = scale * scale * scale, part = power * power;
-    part = part < 1.0 ? part : 1.0;
-    while (n + 1 < BST_SMEAR_LEVELS && part * s->tolerance[n] + s->point_error > allowed) {
-        n++;
-    }
-    return n;
-}
-
-int bst_smear_choose_level(const bst_smear *s, double scale) {
-    return first_level(s, scale, NODE_SHARE * bst_smear_allowed(s, s->last_read_e));
-}
-
 /* Error bound of a level for stars of a cell (NULL: of all stars), cached in the cell. */
 static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *cell) {
     if (!cell) {
@@ -408,7 +382,7 @@ static double star_prediction(const bst_smear *s, int n, bst_smear_star_motion_c
 static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_cell *cell,
                              const bst_smear_level **out, double *error, double *predicted) {
     double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
-    int n = first_level(s, cell ? cell->scale : 1.0, allowed);
+    int n = bst_smear_first_level(s, cell ? cell->scale : 1.0, allowed);
     BST_TRY(bst_smear_make_level(ctx, s, n));
     *error = star_error(s, n, cell);
     while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 && *error > allowed) {

@@ -14,6 +14,9 @@
  * a bright source's own noise is lower. */
 #define FLANK 0.76
 
+/* Share of the tolerance for nodes. */
+#define NODE_SHARE 0.85
+
 /* Floats of a block of the node table. */
 enum { BST_TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK };
 
@@ -191,6 +194,10 @@ void bst_smear_nodes_box(const bst_smear *s, double low[2], double high[2]);
 
 /* Image error that the tolerance allows, relative to the peak. */
 double bst_smear_allowed(const bst_smear *s, double peak_e);
+
+/* Coarsest level whose error is probably at most `allowed`, relative to the peak, for an image that
+ * moves by `scale` of the path. */
+int bst_smear_first_level(const bst_smear *s, double scale, double allowed);
 
 /* Coarsest level whose error is within the allowed one for the latest source, for an image that
  * moves by `scale` of the path. */

@@ -221,3 +221,26 @@ bst_status bst_smear_make_ahead(bst_ctx *ctx, const bst_smear *s, int n,
     out->nodes = own.nodes;
     return status;
 }
+
+double bst_smear_allowed(const bst_smear *s, double peak_e) {
+    return s->aim * s->options.tolerance_sigma * sqrt(FLANK * peak_e + s->dark_variance_e2) /
+           fmax(peak_e, 1e-9);
+}
+
+int bst_smear_first_level(const bst_smear *s, double scale, double allowed) {
+    int n = 0;
+    if (s->options.temporal_oversample > 0) {
+        return n;
+    }
+    /* mostly three nodes per group: sixth-order errors, for motions up to the path's */
+    double power = scale * scale * scale, part = power * power;
+    part = part < 1.0 ? part : 1.0;
+    while (n + 1 < BST_SMEAR_LEVELS && part * s->tolerance[n] + s->point_error > allowed) {
+        n++;
+    }
+    return n;
+}
+
+int bst_smear_choose_level(const bst_smear *s, double scale) {
+    return bst_smear_first_level(s, scale, NODE_SHARE * bst_smear_allowed(s, s->last_read_e));
+}
