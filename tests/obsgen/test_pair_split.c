@@ -1,6 +1,6 @@
 /* Pairs that image processing finds by a likelihood ratio: chi-square, errors and light of both
- * against sums over fine pixels and numerical derivatives. Linked with a wrap of the tail of
- * chi-square, which keeps what it is asked. */
+ * against sums over fine pixels and numerical derivatives. Linked with wraps of the tail of
+ * chi-square, which keeps what it is asked, and of the generator's draws. */
 #include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
 #include "sim/core/chi_square.h"
@@ -10,6 +10,7 @@ enum { FINE = 4, REACH = 14, ONE = 3, BOTH = 6 }; /* cells per px; px about the 
 
 static double asked[2][2]; /* x and d of the calls */
 static int calls;
+static double answers[2] = {1.0, 1.0}, draw = 0.5; /* of the tail: near and far; of the draw */
 
 double __wrap_bst_chi_square3_tail(double x, double d);
 double __wrap_bst_chi_square3_tail(double x, double d) {
@@ -17,8 +18,14 @@ double __wrap_bst_chi_square3_tail(double x, double d) {
         asked[calls][0] = x;
         asked[calls][1] = d;
     }
-    calls++;
-    return 1.0; /* always a pair */
+    return answers[calls++ > 0];
+}
+
+double __wrap_bst_generator_uniform(const bst_generator *g, uint64_t which);
+double __wrap_bst_generator_uniform(const bst_generator *g, uint64_t which) {
+    (void)g;
+    (void)which;
+    return draw;
 }
 
 /* A source as the test sees it: light and place, px. */
@@ -151,6 +158,22 @@ static void split(const pair_scene *p, generator_source out[2]) {
     bst_generator_split_pairs(&g);
 }
 
+/* Probability that a fit finds the pair farther apart than a full width at half maximum, from the
+ * covariance of both places. */
+static double share_far(const pair_scene *p, double inverse[BOTH][BOTH]) {
+    double d[2] = {p->source[1].v[1] - p->source[0].v[1], p->source[1].v[2] - p->source[0].v[2]},
+           apart = hypot(d[0], d[1]), variance = 0.0;
+    for (int i = 0; i < 2; i++) {
+        for (int k = 0; k < 2; k++) {
+            double own = inverse[1 + i][1 + k] + inverse[4 + i][4 + k],
+                   shared = inverse[1 + i][4 + k] + inverse[4 + i][1 + k];
+            variance += d[i] * d[k] / (apart * apart) * (own - shared);
+        }
+    }
+    double fwhm = 2.0 * sqrt(2.0 * log(2.0)) * p->sigma;
+    return 0.5 * erfc(-(apart - fwhm) / sqrt(2.0 * variance));
+}
+
 /* Chi-square to 1e-3 and the errors' ratios to 2e-3: the generator's grid has half a sigma and ends
  * at four; the test's has 1/4 px and ends far outside. */
 static void check(const pair_scene *p) {
@@ -187,13 +210,24 @@ static void check(const pair_scene *p) {
         bst_assert_close(asked[0][0], least, 1e-9);
         bst_assert_close(asked[1][0], least + 5.5, 1e-9); /* 2 ln 16: beside the source */
         bst_assert_close(asked[1][1], asked[0][1], 1e-12);
+        double far = share_far(p, a);
+        assert_true(far > 0.02 && far < 0.98);
+        answers[0] = 0.0; /* pairs that are far apart alone */
+        draw = far - 0.005;
+        split(p, out);
+        assert_true(out[1].found);
+        draw = far + 0.005;
+        split(p, out);
+        assert_false(out[1].found);
+        answers[0] = 1.0;
+        draw = 0.5;
     }
 }
 
 static void points_in_all_directions(void **state) {
     (void)state;
     for (int k = 0; k < 4; k++) {
-        double angle = 0.4 + 1.3 * k, apart = 1.6 + 0.2 * k;
+        double angle = 0.4 + 1.3 * k, apart = 2.217 + 0.015 * k;
         const pair_scene p = {
             .sigma = 0.95,
             .c = 1.0,
