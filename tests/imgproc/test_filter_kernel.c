@@ -145,8 +145,80 @@ static void points(void **state) {
     }
 }
 
+/* Shares of a source's light in the pixels of a filter's largest kernel, of unit norm; returns the
+ * norm. */
+static double known_image(const bst_known_psf *k, int side, double x, double y, double *out) {
+    double square = 0.0;
+    for (int i = 0; i < side * side; i++) {
+        out[i] =
+            bst_known_psf_share(k, k->nodes, 1, i % side - side / 2 - x, i / side - side / 2 - y);
+        square += out[i] * out[i];
+    }
+    for (int i = 0; i < side * side; i++) {
+        out[i] /= sqrt(square);
+    }
+    return sqrt(square);
+}
+
+/* Astigmatism along a slanting axis out of focus, and coma: no axis is like the other one. */
+static void known_psf(void **state) {
+    (void)state;
+    enum { PHASES = 7 };
+    static const double by[3][2] = {{0.1, 0.0}, {0.0, 0.1}, {0.1, 0.1}};
+    static double here[PLANE * PLANE], there[PLANE * PLANE];
+    bst_ctx ctx = {0};
+    bst_psf *psf;
+    bst_known_psf *known;
+    bst_filter f;
+    bst_camera camera = {.width_px = SIDE,
+                         .height_px = SIDE,
+                         .pixel_scale_arcsec = 3.0,
+                         .aperture_m = 0.15,
+                         .psf_fwhm_px = 2.0,
+                         .optics = {.psf = BST_PSF_DIFFRACTION, .q = 1.8, .wavelengths = 1}};
+    camera.optics.zernike_waves.waves[4 - 2] = 0.10;
+    camera.optics.zernike_waves.waves[5 - 2] = 0.09;
+    camera.optics.zernike_waves.waves[6 - 2] = 0.04;
+    camera.optics.zernike_waves.waves[8 - 2] = 0.03;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, SIDE, SIDE, 0.2, &known));
+    bst_assert_ok(&ctx, bst_filter_create(&ctx, known, SIDE, SIDE, 30.0, 1, &f));
+    bst_filter_set(&f, known->sigma_px, 1, 0.0, 0.0);
+    for (int k = -f.radius; k <= f.radius; k++) {
+        double column = 0.0, row = 0.0;
+        for (int i = -f.radius; i <= f.radius; i++) {
+            column += point_at(&f, k, i) * point_at(&f, k, i);
+            row += point_at(&f, i, k) * point_at(&f, i, k);
+        }
+        bst_assert_close(f.square_x[k + f.radius], column, 1e-6); /* single precision */
+        bst_assert_close(f.square_y[k + f.radius], row, 1e-6);
+    }
+    double norm2 = 0.0, form[3] = {0.0};
+    int side = 2 * f.radius + 3;
+    for (int p = 0; p < PHASES * PHASES; p++) {
+        double x = (p % PHASES + 0.5) / PHASES - 0.5, y = (p / PHASES + 0.5) / PHASES - 0.5;
+        double norm = known_image(known, side, x, y, here);
+        norm2 += norm * norm / (PHASES * PHASES);
+        for (int k = 0; k < 3; k++) {
+            double r = 0.0;
+            (void)known_image(known, side, x + by[k][0], y + by[k][1], there);
+            for (int i = 0; i < side * side; i++) {
+                r += here[i] * there[i];
+            }
+            form[k] += 2.0 * (1.0 - r) / 0.01 / (PHASES * PHASES);
+        }
+    }
+    double xy = 0.5 * (form[2] - form[0] - form[1]);
+    assert_true(xy * xy > 0.02 * form[0] * form[1]); /* the axes do matter here */
+    close_by(f.norm, sqrt(norm2), 0.005);            /* five phases an axis for seven */
+    close_by(f.point_density, sqrt(form[0] * form[1] - xy * xy), 0.01); /* steps of 0.1 px too */
+    bst_filter_free(&f);
+    bst_known_psf_free(known);
+    bst_psf_free(psf);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(streaks_in_all_directions),
-                                       cmocka_unit_test(points)};
+                                       cmocka_unit_test(points), cmocka_unit_test(known_psf)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
