@@ -1,6 +1,7 @@
 /* Earth orientation after the end of its table: what is predicted from a part of the C04 series
  * against the rest of it. */
 #include "sim/astro/frames.h"
+#include "sim/astro/frames_internal.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -169,8 +170,43 @@ static void the_warning_states_the_uncertainty(void **state) {
     bst_astro_eop_free(eop);
 }
 
+/* UT2 - UT1 by its conventional terms, s (IERS Bulletin A). */
+static double seasons_s(double mjd) {
+    double x = 2.0 * BST_PI * (mjd - 51544.03) / 365.2422;
+    return 0.022 * sin(x) - 0.012 * cos(x) - 0.006 * sin(2.0 * x) + 0.007 * cos(2.0 * x);
+}
+
+/* A day that lengthens by -0.8 ms, the mean of decades, with seasons, and a pole that stays beside
+ * the secular one go on as they are: x and y, and all seasons. */
+static void seasons_and_pole_go_on(void **state) {
+    (void)state;
+    enum { ROWS = 900 };
+    static bst_astro_eop_values rows[ROWS];
+    bst_ctx ctx = {0};
+    bst_astro_eop_prediction p;
+    static const double off[2] = {0.03, -0.02};
+    for (int i = 0; i < ROWS; i++) {
+        double mjd = FIRST + i, years = (mjd - 51544.5) / 365.25;
+        rows[i].ut1_minus_utc_s = -0.1 - 0.0008 * i - seasons_s(mjd);
+        rows[i].xp_rad = (0.0550 + 0.001677 * years + off[0]) * BST_ARCSEC_RAD;
+        rows[i].yp_rad = (0.3205 + 0.003460 * years + off[1]) * BST_ARCSEC_RAD;
+    }
+    bst_assert_ok(&ctx, bst_astro_eop_prediction_fit(&ctx, FIRST, ROWS, rows, &p));
+    for (int days = 1; days < 365; days += 40) {
+        double mjd = FIRST + ROWS - 1 + days, years = (mjd - 51544.5) / 365.25;
+        bst_astro_eop_values v;
+        bst_astro_eop_prediction_at(&p, mjd, &v);
+        bst_assert_close(v.ut1_minus_utc_s, -0.1 - 0.0008 * (ROWS - 1 + days) - seasons_s(mjd),
+                         1e-9);
+        /* priors of 0.05 arcsec and more beside the rows of two years: 1e-4 */
+        bst_assert_close(v.xp_rad / BST_ARCSEC_RAD, 0.0550 + 0.001677 * years + off[0], 2e-4);
+        bst_assert_close(v.yp_rad / BST_ARCSEC_RAD, 0.3205 + 0.003460 * years + off[1], 2e-4);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(seasons_and_pole_go_on),
         cmocka_unit_test(predictions_keep_their_uncertainty),
         cmocka_unit_test(goes_on_where_the_table_ends),
         cmocka_unit_test(far_dates),

@@ -157,6 +157,63 @@ static void ends_of_the_line(void **state) {
     assert_true(bst_astro_earth_occults(side_a, side_b, north));
 }
 
+/* Half of the discriminant of a ray's meeting with the ellipsoid: 0 on the limb, below 0 outside.
+ */
+static double grazing(bst_vec3 position, bst_vec3 pole, bst_vec3 ray) {
+    bst_vec3 p = bst_earth_unit_sphere(position, pole, 0.0),
+             d = bst_earth_unit_sphere(ray, pole, 0.0);
+    double b = bst_vec3_dot(p, d), dd = bst_vec3_dot(d, d);
+    return b * b / dd - (bst_vec3_dot(p, p) - 1.0);
+}
+
+/* Place u towards the nadir of the limb at a distance v beside a direction, by bisection. */
+static double limb_beside(bst_vec3 position, bst_vec3 pole, bst_vec3 towards, double v) {
+    bst_vec3 up = bst_vec3_unit(position);
+    bst_vec3 e1 = bst_vec3_unit(bst_vec3_axpy(up, -bst_vec3_dot(up, towards), towards));
+    e1 = bst_vec3_scale(e1, -1.0);
+    bst_vec3 e2 = bst_vec3_cross(towards, e1);
+    double low = -0.3, high = 0.3;
+    for (int i = 0; i < 60; i++) {
+        double u = 0.5 * (low + high);
+        bst_vec3 ray = bst_vec3_axpy(bst_vec3_axpy(towards, u, e1), v, e2);
+        *(grazing(position, pole, ray) < 0.0 ? &low : &high) = u;
+    }
+    return 0.5 * (low + high);
+}
+
+/* The osculating circle of the limb, seen from all latitudes in all directions past a slanting
+ * pole: its curvature and place by five points of the limb. */
+static void limb_is_a_circle_nearby(void **state) {
+    (void)state;
+    bst_vec3 pole = bst_vec3_unit((bst_vec3){0.3, -0.5, 0.8});
+    static const double radii[] = {6.9e6, 8.5e6, 4.2e7};
+    for (int i = 0; i < 60; i++) {
+        double r = radii[i % 3], a = 0.9 * i, z = cos(0.37 * i);
+        bst_vec3 up = {sqrt(1.0 - z * z) * cos(a), sqrt(1.0 - z * z) * sin(a), z};
+        bst_vec3 position = bst_vec3_scale(up, r);
+        bst_vec3 side = bst_vec3_perpendicular(up);
+        side = bst_vec3_add(bst_vec3_scale(side, cos(1.7 * i)),
+                            bst_vec3_scale(bst_vec3_cross(up, side), sin(1.7 * i)));
+        double off = asin(BST_EARTH_RADIUS_M / r) + 0.01 * (i % 5 - 2); /* from the nadir */
+        bst_vec3 towards =
+            bst_vec3_add(bst_vec3_scale(up, -cos(off)), bst_vec3_scale(side, sin(off)));
+        double h = 2e-3, u[5];
+        for (int k = 0; k < 5; k++) {
+            u[k] = limb_beside(position, pole, towards, (k - 2) * h);
+        }
+        double slope = (u[0] - 8.0 * u[1] + 8.0 * u[3] - u[4]) / (12.0 * h);
+        double bend = (-u[0] + 16.0 * u[1] - 30.0 * u[2] + 16.0 * u[3] - u[4]) / (12.0 * h * h);
+        double root = sqrt(1.0 + slope * slope), radius = root * root * root / bend;
+        double x = u[2] + radius / root, y = -radius * slope / root;
+        bst_earth_limb limb;
+        assert_true(bst_earth_limb_at(position, pole, 0.0, towards, &limb));
+        /* differences of numbers to 1e-16 over h^2, and h^4 of the sixth derivative: 1e-9 */
+        bst_assert_close(limb.curvature, 1.0 / radius, 1e-7 / radius);
+        /* hypot - radius loses six digits of the radius, 0.1 to 10 */
+        bst_assert_close(limb.beyond, hypot(x, y) - radius, 1e-9);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(discs_of_equal_size),
@@ -165,6 +222,7 @@ int main(void) {
         cmocka_unit_test(places_around_the_earth),
         cmocka_unit_test(grazing_lines),
         cmocka_unit_test(ends_of_the_line),
+        cmocka_unit_test(limb_is_a_circle_nearby),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -372,7 +372,10 @@ class Others(OnePage):
                                " 2, 0.25, NULL)", (i, name, i, seen))
         manifest = runs.manifest(made)
         manifest["sightings"] = {"objects": 3, "objects_seen": 2, "objects_in_field": 3,
-                                 "passes": 3, "passes_seen": 2, "custody_fraction_all": 0.25}
+                                 "passes": 3, "passes_seen": 2, "custody_fraction_all": 0.25,
+                                 "custody_fraction_seen": 0.375, "revisit_mean_s": 12.5, "revisit_most_s": 34,
+                                 "place_rms_arcsec": 0.75, "track_rms_arcsec": 0.125, "tasks": 7, "tasks_done": 4,
+                                 "tasks_not_found": 2, "tasks_lost": 1}
         with open(made + "/manifest.json", "w", encoding="utf-8") as file:
             json.dump(manifest, file)
         result = report(made)
@@ -382,6 +385,16 @@ class Others(OnePage):
         cards = page.cards()
         self.assertEqual((cards["objects seen"], cards["passes seen"]), ("2", "2"))
         self.assertEqual(float(cards["object custody, mean of all"]), 25)
+        self.assertEqual(float(cards["revisit, mean"]), 12.5)
+        self.assertEqual(float(cards["detections from truth, RMS"]), 0.75)
+        self.assertEqual(cards["tasks done"], "4")
+        words = " ".join("".join(page.root.itertext()).split())
+        for note in ("of 3, 3 of them in a field", "of 3 through a field", "at most 34.00 s", "37.5 % of those seen",
+                     "tracks 0.125 arcsec", "of 7; 2 not found, 1 lost"):
+            self.assertTrue(note in words, note)
+        rows = [["".join(cell.itertext()) for cell in row.iter("td")] for row in page.root.iter("tr")]
+        self.assertIn(["MANY <b>", "1", "1", "3", "0", "50.00"], [row[:6] for row in rows])
+        self.assertIn(["FEW", "0", "1", "1", "0", "50.00"], [row[:6] for row in rows])
         line = [part for part in page.root.iter("svg")
                 if part.get("aria-label", "").startswith("Timeline of the objects")][0]
         words = [text.text for text in line.iter("text") if text.get("text-anchor") == "end"]

@@ -184,10 +184,34 @@ static void the_servo_diverges_where_its_margins_end(void **state) {
     }
 }
 
+/* Without a flexible mode in the line of sight: a torque on the axis passes the plant at once, and
+ * the loop with its delay works against it. The share of the mode is that of the axis. */
+static void torque_against_the_loop(void **state) {
+    (void)state;
+    bst_mount_config c = linear_config();
+    c.flexible.line_of_sight_fraction[0] = 0.2;
+    assert_true(model_of(&c, 1).linear.line_of_sight_fraction == 0.7);
+    assert_true(model_of(&c, 0).linear.line_of_sight_fraction == 0.2);
+    c.flexible.line_of_sight_fraction[1] = 0.0;
+    c.servo.delay_steps = 5;
+    bst_mount_axis_model late = model_of(&c, 1), prompt = late;
+    prompt.linear.delay_steps = 0;
+    for (double f = 0.5; f < 200.0; f *= 2.1) {
+        bst_mount_axis_gains with, without;
+        bst_mount_axis_response(&late, f, &with);
+        bst_mount_axis_response(&prompt, f, &without);
+        double complex delay = cexp(-I * 2.0 * BST_PI * f * 5.0 * DT);
+        double complex expected = without.plant / (1.0 + with.compensator * without.plant * delay);
+        assert_true(cabs(with.disturbance / expected - 1.0) < 1e-9);
+        assert_true(cabs(with.plant / (without.plant * delay) - 1.0) < 1e-9);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(torque_to_encoder),
         cmocka_unit_test(command_to_sight),
+        cmocka_unit_test(torque_against_the_loop),
         cmocka_unit_test(the_servo_diverges_where_its_margins_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include "gimbal/modules.h"
+#include "gimbal/scripted.h"
 #include "sim/engine/simulation.h"
 #include "sim/world/scene/field.h"
 #include "tests/io/scratch.h"
@@ -259,8 +260,44 @@ static void states(void **state) {
     finish(&f);
 }
 
+/* Ticks of 1 ms: an exposure of 33.5 ms ends at tick 34, where its last attitude is. The rate
+ * changes at the attitudes alone, each of which is after the one before. */
+static void ends_are_at_ticks(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_camera camera = {.width_px = 64, .height_px = 48, .pixel_scale_arcsec = 3.0};
+    const bst_exposure_config exposure = {.exposure_s = 0.0335, .period_s = 0.5, .binning = 1};
+    static const char text[] =
+        "{\"boresight_frame_updates\": 1, \"frames\": ["
+        "{\"frame\": 0, \"q_cam_from_gcrf_start\": [0, 0, 0, 1],"
+        " \"q_cam_from_gcrf_end\": [0.6, 0, 0, 0.8]},"
+        "{\"frame\": 1, \"q_cam_from_gcrf_start\": [0.6, 0, 0, 0.8],"
+        " \"q_cam_from_gcrf_end\": [0, 0.6, 0, 0.8]}]}";
+    bst_frame_updates *updates;
+    bst_scripted *s;
+    bst_assert_ok(&ctx, bst_frame_updates_parse(&ctx, "u.json", text, sizeof text - 1, &camera,
+                                                &exposure, &updates));
+    bst_assert_ok(
+        &ctx, bst_scripted_create(&ctx, updates, &camera, &exposure, 1000, BST_SCRIPTED_ERROR, &s));
+    bst_assert_close(bst_scripted_at(s, 34).x, 0.6, 1e-12);
+    /* a quarter and half of the turn of 2 asin(0.6) */
+    bst_assert_close(bst_scripted_at(s, 17).x, sin(0.5 * asin(0.6)), 1e-12);
+    bst_assert_close(bst_scripted_at(s, 300).x, 0.6, 1e-12);
+    bst_assert_close(bst_scripted_at(s, 534).y, 0.6, 1e-12);
+    (void)bst_scripted_at(s, 0);
+    static const int64_t ticks[] = {0, 34, 500, 534};
+    for (int k = 0; k < 3; k++) {
+        assert_int_equal(bst_scripted_next(s, ticks[k]), ticks[k + 1]);
+        assert_int_equal(bst_scripted_next(s, ticks[k + 1] - 1), ticks[k + 1]);
+    }
+    assert_true(bst_scripted_next(s, 534) == INT64_MAX);
+    bst_scripted_free(s);
+    bst_frame_updates_free(updates);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pointing), cmocka_unit_test(missing_frames),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(ends_are_at_ticks),
+                                       cmocka_unit_test(pointing), cmocka_unit_test(missing_frames),
                                        cmocka_unit_test(faults), cmocka_unit_test(states)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -529,8 +529,35 @@ static void frames_without_exposures(void **state) {
     assert_int_equal(f->sensor.frames[0].mode, BST_MODE_SLEW);
 }
 
+/* The caption of the wheels' chart: the wheel that is nearest to its own limit, in percent of it,
+ * of this sensor alone. */
+static void fastest_wheel(void **state) {
+    (void)state;
+    run_tables t;
+    bst_ctx ctx = {0};
+    char *page = NULL;
+    size_t bytes = 0;
+    FILE *out = open_memstream(&page, &bytes);
+    assert_non_null(out);
+    run_tables_begin(&t, "run.sqlite");
+    run_tables_sql(&t,
+                   "CREATE TABLE wheels (sensor INT, time_s REAL, wheel INT, speed_rpm REAL,"
+                   " speed_limit_rpm REAL);"
+                   "INSERT INTO wheels VALUES (1, 0, 0, 1200, 6000), (1, 0, 1, -900, 4000),"
+                   " (1, 0, 2, 100, 6000), (0, 0, 0, 5900, 6000), (1, 9, 0, -1500, 6000),"
+                   " (1, 9, 1, -1300, 4000), (1, 9, 2, 1400, 6000);");
+    bst_run_reader *run = run_tables_open(&t);
+    bst_assert_ok(&ctx, bst_report_wheels(&ctx, out, run, 1, 9.0));
+    fclose(out);
+    assert_non_null(strstr(page, "Limit: 4000 to 6000 rpm"));
+    assert_non_null(strstr(page, "Largest: 1300 rpm, 32.5 % of it, wheel 1."));
+    free(page);
+    run_tables_end(&t);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fastest_wheel),
         cmocka_unit_test_setup_teardown(values_of_the_frames, set_up, tear_down),
         cmocka_unit_test_setup_teardown(values_of_the_world, set_up, tear_down),
         cmocka_unit_test_setup_teardown(errors_of_the_track, set_up, tear_down),
