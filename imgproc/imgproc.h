@@ -88,6 +88,9 @@ typedef struct bst_imgproc_frame {
     double exposure_s;
     /* another frame is processed concurrently: use half of the threads */
     bool beside_another;
+    /* only the detections are needed: neither bst_imgproc_stack_frame nor
+     * bst_imgproc_follow_streaks is called for this frame */
+    bool detections_only;
 } bst_imgproc_frame;
 
 /* Detector of one camera: configuration and work space. */

@@ -269,7 +269,6 @@ static bst_status detect_sources(bst_ctx *ctx, const bst_imgproc_state *m, bst_i
                                  const bst_imgproc_exposure *e, bool beside_another,
                                  bst_detections *out, int capacity) {
     const bst_frame_message *message = e->message;
-    const bst_camera_motion *motion = e->motion;
     const bst_imgproc_windows windows = {m->windows.items, m->windows.count};
     const uint16_t *pixels;
     if (m->pixels) {
@@ -282,7 +281,8 @@ static bst_status detect_sources(bst_ctx *ctx, const bst_imgproc_state *m, bst_i
         .binning = message->binning,
         .bits = message->bits,
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
-        .beside_another = beside_another};
+        .beside_another = beside_another,
+        .detections_only = !m->stack && !m->config->long_streaks};
     bst_status status = bst_reference_pixels_subtract(
         ctx, &l->references, &m->config->reference_pixels, &m->camera, &frame, &frame);
     if (status != BST_OK) {
@@ -290,10 +290,10 @@ static bst_status detect_sources(bst_ctx *ctx, const bst_imgproc_state *m, bst_i
         return status;
     }
     status = m->plugin ? bst_plugin_detector_detect(ctx, m->plugin, &frame, message->exposure_id,
-                                                    motion, out, capacity)
-             : windows.count > 0
-                 ? bst_imgproc_detect_windows(ctx, l->ip, &frame, &windows, motion, out, capacity)
-                 : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
+                                                    e->motion, out, capacity)
+             : windows.count > 0 ? bst_imgproc_detect_windows(ctx, l->ip, &frame, &windows,
+                                                              e->motion, out, capacity)
+                                 : bst_imgproc_detect(ctx, l->ip, &frame, e->motion, out, capacity);
     bst_frame_unmap(message->frame);
     return status;
 }

@@ -316,7 +316,7 @@ static void set_frame_view(bst_imgproc *ip, const bst_imgproc_frame *frame,
     if (motion) {
         ip->motion = *motion;
     }
-    ip->view = (bst_locate_frame){.signal = ip->electrons,
+    ip->view = (bst_locate_frame){.signal = bst_imgproc_signal_of(ip, frame),
                                   .width = frame->window.width / frame->binning,
                                   .height = frame->window.height / frame->binning,
                                   .background = &ip->background,
@@ -330,7 +330,7 @@ static void set_frame_view(bst_imgproc *ip, const bst_imgproc_frame *frame,
                                   .pool = pool};
     ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
     ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
-    ip->left = (bst_stack_frame){.signal = ip->electrons,
+    ip->left = (bst_stack_frame){.signal = bst_imgproc_signal_of(ip, frame),
                                  .background = &ip->background,
                                  .width = frame->window.width / frame->binning,
                                  .height = frame->window.height / frame->binning,
@@ -391,7 +391,7 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
                               .user = read,
                               .raw = frame->pixels,
                               .gain = plain,
-                              .signal = ip->electrons,
+                              .signal = bst_imgproc_signal_of(ip, frame),
                               .width = width,
                               .height = height,
                               .saturated_dn = saturated_dn,

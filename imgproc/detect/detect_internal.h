@@ -49,6 +49,12 @@ struct bst_imgproc {
     bst_pixel_shows shows; /* bad-pixel evidence of the latest frame; capacity 0: not collected */
 };
 
+/* Memory for the frame's signal above the background; NULL: it is not read, because a frame with
+ * too long streaks is not measured. */
+static inline float *bst_imgproc_signal_of(const bst_imgproc *ip, const bst_imgproc_frame *frame) {
+    return ip->smeared && frame->detections_only ? NULL : ip->electrons;
+}
+
 /* Allocates what extended targets need, with config.extended.enabled. BST_ERR_MEMORY. */
 bst_status bst_imgproc_open_silhouettes(bst_ctx *ctx, bst_imgproc *ip) BST_MUST_CHECK;
 /* Frees it. */

@@ -187,6 +187,7 @@ bst_status bst_imgproc_follow_streaks(bst_ctx *ctx, bst_imgproc *ip,
                                       const bst_star_path_node *nodes, int count,
                                       bst_detections *out, int capacity, bool *followed) {
     assert(ip && nodes && count >= 2 && out && followed && !ip->windowed);
+    assert(ip->view.signal);
     bst_star_path_node *scaled = malloc((size_t)count * sizeof *scaled);
     bst_star_path *path = malloc(sizeof *path);
     float *pixels = copy_signal(ip);

@@ -7,6 +7,7 @@
 
 bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
                                         bst_quat q_cam_from_gcrf) {
+    assert(ip->left.signal);
     bst_stack_frame frame = ip->left;
     frame.time_s = time_s;
     frame.q_cam_from_gcrf = q_cam_from_gcrf;

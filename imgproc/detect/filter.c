@@ -9,9 +9,10 @@
 #include "sim/core/pages.h"
 
 enum {
-    PART_PX = 131072, /* pixels per part of a parallel pass */
-    GROUP = 4,        /* rows filtered together */
-    LATEST = 3,       /* latest rows of the streak map, kept in a ring */
+    PART_PX = 131072,     /* least pixels per part of a parallel pass */
+    PARTS_PER_THREAD = 8, /* at most: each part filters 2 radius rows of its neighbours again */
+    GROUP = 4,            /* rows filtered together */
+    LATEST = 3,           /* latest rows of the streak map, kept in a ring */
     CACHED_PX = 1 << 20,
     FEW_TAPS = 24, /* a streak of at most so many taps is computed on demand */
     /* pixels per maximum below which a frame is crowded, and a map of the larger output is kept */
@@ -188,7 +189,7 @@ static void filter_horizontal(const pass *p, int y, bool own, float *lines, floa
         return;
     }
     const float *normalised = lines;
-    read_row(p, y, lines, own && !p->provisional ? p->signal + row : lines + 2 * line);
+    read_row(p, y, lines, own && p->signal && !p->provisional ? p->signal + row : lines + 2 * line);
     const float *in[2 * BST_FILTER_MAX_RADIUS + 1];
     for (int x = 0; x < width; x += SOON_PX) {
         int count = width - x < SOON_PX ? width - x : SOON_PX;
@@ -391,8 +392,9 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_filter_input *i
     }
     edge_factors(f, f->square_x, width, f->edge_x);
     edge_factors(f, f->square_y, height, f->edge_y);
-    /* large parts: each filters 2 radius rows of its neighbours again */
     int rows = PART_PX / width > 0 ? PART_PX / width : 1, reach = 0;
+    int share = height / (PARTS_PER_THREAD * bst_parallel_threads(pool));
+    rows = share > rows ? share : rows;
     for (int t = 0; t < f->taps; t++) {
         reach = abs(f->tap_y[t]) > reach ? abs(f->tap_y[t]) : reach;
     }
@@ -418,7 +420,7 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_filter_input *i
     }
     bst_parallel_for(pool, height, rows, p.apart ? finish_maxima_transient : finish_maxima, &p);
     f->crowded = is_crowded(f);
-    if (p.provisional && !f->crowded) {
+    if (p.signal && p.provisional && !f->crowded) {
         bst_parallel_for(pool, height, rows, keep_signal, &p);
     }
     if (p.apart && f->crowded) {

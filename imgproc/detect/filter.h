@@ -123,7 +123,8 @@ typedef struct bst_filter_input {
     const void *user;
     const uint16_t *raw; /* [height][width] */
     const bst_row_gain *gain;
-    float *signal; /* [height][width]: output, electrons above the background */
+    /* [height][width]: output, electrons above the background; NULL: not wanted */
+    float *signal;
     int width, height;
     /* raw value from which a pixel is saturated: its signal becomes BST_PIXEL_SATURATED */
     int saturated_dn;

@@ -110,7 +110,8 @@ static bst_status process(bst_ctx *ctx, const bst_bench_options *options, shots 
                                    .window = s->view.window,
                                    .binning = 1,
                                    .bits = (int)camera->bits,
-                                   .exposure_s = s->view.scene.exposure_s};
+                                   .exposure_s = s->view.scene.exposure_s,
+                                   .detections_only = true};
         bst_bench_start(&clock);
         status = bst_imgproc_detect(ctx, ip, &frame, &shown->motion, found, (int)config.capacity);
         if (i >= WARM_UP) {

@@ -136,6 +136,45 @@ static void test_stars_points_and_edges(void **state) {
     synthetic_free(&s);
 }
 
+/* Detections of a frame whose signal is not kept are the same, also after a frame with a signal. */
+static void test_detections_only(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    synthetic s;
+    synthetic_init(&s, SIDE, SIDE);
+    bst_star_path_node nodes[NODES];
+    double mean[2];
+    bent_motion(nodes);
+    mean_of(nodes, mean);
+    add_star(&s, nodes, mean, 110.0, 45.0, 60000.0);
+    add_star(&s, nodes, mean, 95.0, 140.0, 30000.0);
+    synthetic_add(&s, 170.7, 20.2, 1200.0, 0.0, 0.0);
+    synthetic_expose(&s, bst_rng_make_key(28, 0, "test", "long_streaks"), 1);
+    bst_imgproc *ip = synthetic_processor(&ctx, &s);
+    bst_detections *kept = synthetic_detections(2048), *only = synthetic_detections(2048);
+    bst_imgproc_frame frame = synthetic_frame(&s);
+    bst_camera_motion motion = synthetic_motion(&s, 116.0, 40.0);
+    bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, &motion, kept, 2048));
+    assert_true(bst_imgproc_smeared(ip) && kept->count > 3);
+    bst_stack_frame signal = bst_imgproc_stack_frame(ip, 0.0, BST_QUAT_IDENTITY);
+    /* values that no frame has: neither read nor written again */
+    float *pixels = (float *)signal.signal;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        pixels[i] = 1e9f;
+    }
+    frame.detections_only = true;
+    bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, &motion, only, 2048));
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        assert_true(pixels[i] == 1e9f);
+    }
+    assert_int_equal(only->count, kept->count);
+    assert_memory_equal(only->items, kept->items, (size_t)only->count * sizeof only->items[0]);
+    bst_imgproc_free(ip);
+    free(kept);
+    free(only);
+    synthetic_free(&s);
+}
+
 /* The same pixels as those of a finer sensor that are binned, in a window off its corner: the same
  * streaks, in its pixels. */
 static void test_binned_pixels_in_a_window(void **state) {
@@ -210,6 +249,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_path_of_a_motion),
         cmocka_unit_test(test_stars_points_and_edges),
+        cmocka_unit_test(test_detections_only),
         cmocka_unit_test(test_binned_pixels_in_a_window),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

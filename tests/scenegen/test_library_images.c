@@ -153,6 +153,16 @@ static bool judge(fixture *f, const bst_satellite *satellite, const char *name, 
     return kept;
 }
 
+/* Whether a view is left to the slow form: all of Starlink (half of all time), and those of three
+ * others that turn in bright light at 40 px (three quarters of the rest: sharp glints of curved
+ * parts). */
+static bool is_dear(const char *name, int n) {
+    enum { BRIGHT_TURN = 14 };
+    return strstr(name, "starlink") ||
+           (n == BRIGHT_TURN &&
+            (strstr(name, "falcon_9") || strstr(name, "iss_") || strstr(name, "centaur")));
+}
+
 static void test_library(void **state) {
     enum { SHARE = 3, MOST = 1024 };
     fixture *f = *state;
@@ -162,9 +172,7 @@ static void test_library(void **state) {
     assert_non_null(folder);
     for (struct dirent *entry; (entry = readdir(folder));) {
         char path[400];
-        bool dear = strstr(entry->d_name, "starlink") != NULL; /* half of all time */
-        if (!strstr(entry->d_name, ".json") || (wanted && !strstr(entry->d_name, wanted)) ||
-            (dear && !slow)) {
+        if (!strstr(entry->d_name, ".json") || (wanted && !strstr(entry->d_name, wanted))) {
             continue;
         }
         snprintf(path, sizeof path, "scenarios/satellites/%s", entry->d_name);
@@ -174,6 +182,9 @@ static void test_library(void **state) {
         for (int n = slow ? first_view : (entry->d_name[0] + direction_set) % SHARE;
              n <= (slow ? last_view : QUICK - 1); n += slow ? 1 : SHARE + 4) {
             double ratio;
+            if (!slow && is_dear(entry->d_name, n)) {
+                continue;
+            }
             broken += !judge(f, satellite, entry->d_name, n, &ratio);
             if (ratio > 0.0 && count < MOST) {
                 ratios[count++] = ratio;
