@@ -79,7 +79,8 @@ void bst_run_summary_print(const bst_run_sensor_figures *figures) {
     bst_run_print_row("time to acquire", "%.2f", f->time_to_acquire_s, "s");
     bst_run_print_row("time to settle", "%.2f", f->time_to_settle_s, "s");
     bst_run_print_row("custody", "%.2f", 100.0 * f->custody, "% of visible frames in track");
-    bst_run_print_row("custody once acquired", "%.2f", 100.0 * f->track_fraction,
+    bst_run_print_row("custody once acquired", "%.2f",
+                      isfinite(f->time_to_acquire_s) ? 100.0 * f->track_fraction : NAN,
                       "% of visible frames since then in track");
     bst_run_print_row("pointing RMS", "%.3f", f->pointing_rms_px, "px");
     bst_run_print_row("pointing 99th percentile", "%.3f", f->pointing_p99_px, "px");

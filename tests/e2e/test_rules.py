@@ -24,6 +24,7 @@ CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
          ("burns", '/world/objects/0/burns=[{"time_s": 300, "dv_rtn_mps": [0, 1, 0]}]',
           "/world/objects/0/burns/0/time_s: the burn at 300 s is after the run's end at 300 s"),
          ("lost_frames", runs.SENSOR + "/exposure/dropped_fraction=1", "1 loses every frame"),
+         ("lost_frames", runs.SENSOR + "/exposure/first_s=299.9", "/exposure/first_s: the first exposure, from 299.9 s, ends at 300.4 s"),
          ("modules", MODULES + "={}", "nothing is seen or recorded"),
          ("modules", MODULES + '={"gimbal": {"type": "second_order"}, "scenegen": {"type": "opencl"}, "imgproc": '
           '{"type": "standard"}, "control": {"type": "standard"}}', "modules/tracker: there is none"),

@@ -195,7 +195,17 @@ static bst_status long_exposure(const subject *s) {
 }
 
 static bst_status no_frames(const subject *s) {
-    if (s->sensor->exposure.dropped_fraction == 1.0) {
+    const bst_exposure_config *e = &s->sensor->exposure;
+    bst_loop_timing timing;
+    bst_loop_timing_of(s->scenario, s->observer, s->number, &timing);
+    double end_s = e->first_s + timing.exposure_s;
+    if (s->scenario->duration_ticks > 0 && end_s > s->scenario->duration_s) {
+        bst_log(s->ctx, BST_LOG_WARNING,
+                "%s/exposure/first_s: the first exposure, from %g s, ends at %g s, after the run's "
+                "end at %g s: nothing is seen; begin earlier or make duration_s longer",
+                s->place, e->first_s, end_s, s->scenario->duration_s);
+    }
+    if (e->dropped_fraction == 1.0) {
         bst_log(s->ctx, BST_LOG_WARNING,
                 "%s/exposure/dropped_fraction: 1 loses every frame, so that nothing is seen; give "
                 "less than 1",
@@ -320,7 +330,8 @@ static const rule rules[] = {
      NULL, no_modules, NULL},
     {"exposure_period", "an exposure longer than the period of the exposures", NULL, long_exposure,
      NULL},
-    {"lost_frames", "a sensor all of whose frames are lost", NULL, no_frames, NULL},
+    {"lost_frames", "a sensor all of whose frames are lost, or whose first one ends after the run",
+     NULL, no_frames, NULL},
     {"wide_field", "a field too wide for the gnomonic projection (an error from 160 degrees on)",
      NULL, wide_field, NULL},
     {"replaced", "psf_fwhm_px beside ensquared_energy, throughput or flux beside zero_point_mag",
