@@ -5,8 +5,7 @@
 
 enum { COUNT = 60, SEEDS = 60, WAVES = 32 };
 static const double RADIUS_M = 5.0;
-/* An object at 1,000 to 1,900 km, beside which 0.3 arcsec of one direction, 0.05 of all, are 0.3 m.
- */
+/* 0.5 m of one direction at 5,600 km, where the object is, and 0.07 m of the mean of all */
 static const double SIGMA_RAD = 0.02 * BST_ARCSEC_RAD;
 
 static scene near_pass(void) {
@@ -132,7 +131,7 @@ static void sums_over_all_pairs(void **state) {
         bst_od_photocentre_effect items[N];
         double want[6][6] = {{0.0}}, got[6][6];
         for (int i = 0; i < N; i++) {
-            /* in turn rad: 0.3 in all, or 15 */
+            /* rad; 0.3 in all, or 15 */
             const double turn = (wide ? 0.3 : 0.006) * i;
             items[i] = (bst_od_photocentre_effect){
                 .time_s = turn / rate, .direction = {cos(0.7 * turn), sin(0.7 * turn), 0.0}};
