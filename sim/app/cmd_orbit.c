@@ -1,5 +1,6 @@
 /* boresight orbit: an orbit from the directions that a run measured, or a TDM holds. */
 #include <stdio.h>
+#include <sys/stat.h>
 
 #include "sim/analysis/orbit/orbit_options.h"
 #include "sim/app/app.h"
@@ -27,6 +28,19 @@ static const char help_text[] =
     "\n"
     "options:\n";
 
+/* Error of an option for angles of a TDM that is given with a run. */
+static bst_status check_options(bst_ctx *ctx, const bst_orbit_determination *q, const char *path) {
+    struct stat info;
+    const char *option = bst_orbit_tdm_option(q);
+    if (!option || stat(path, &info) != 0 || !S_ISDIR(info.st_mode)) {
+        return BST_OK;
+    }
+    return bst_fail(ctx, BST_ERR_ARGUMENT,
+                    "--%s is for angles of a TDM, and %s is a run, which has its own: give a "
+                    "FILE.tdm, or leave --%s out",
+                    option, path, option);
+}
+
 int bst_cmd_orbit(int argc, char **argv) {
     bst_orbit_command q = BST_ORBIT_COMMAND_DEFAULTS;
     bst_option options[BST_OPTIONS_MAX];
@@ -41,6 +55,9 @@ int bst_cmd_orbit(int argc, char **argv) {
     if (arguments != 1) {
         bst_fail(&ctx, BST_ERR_ARGUMENT,
                  "one folder of a run, or a TDM, is expected, %d were given", arguments);
+        return bst_options_misuse(&ctx, "orbit");
+    }
+    if (check_options(&ctx, &q.determination, argv[1]) != BST_OK) {
         return bst_options_misuse(&ctx, "orbit");
     }
     bst_status status = bst_orbit_determine(&ctx, &q.determination, argv[1]);

@@ -9,6 +9,7 @@
 #include "sim/run/run_directions.h"
 #include "sim/run/run_used_tracks.h"
 #include "sim/world/world_config.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 /* tracks of a sensor at one time; more are left out */
 enum { SLOTS = 64 };
@@ -168,12 +169,6 @@ static bst_status eye_at(bst_ctx *ctx, bst_run_arcs *a, const sensor *s, int64_t
     return BST_OK;
 }
 
-/* bst_custody_photocentre_factor of an object in a direction. */
-static double photocentre_factor(const eye *from, bst_vec3 direction) {
-    return bst_custody_photocentre_factor(
-        bst_vec3_angle(from->sun, bst_vec3_scale(direction, -1.0)));
-}
-
 bst_status bst_run_arcs_detections(bst_ctx *ctx, bst_run_arcs *a, int index,
                                    const bst_detections *detections) {
     return bst_run_centroids_add(ctx, &a->sensors[index].recent, detections);
@@ -203,7 +198,7 @@ static bst_status add_direction(bst_ctx *ctx, bst_run_arcs *a, const sensor *s,
     *z = (bst_od_observation){.observer = at.observer};
     bst_run_measure_direction(bst_knowledge_camera(s->knowledge), t->x_px, t->y_px,
                               centroid->cov_px2, &from->attitude, &at.light, z);
-    z->photocentre_factor = photocentre_factor(&at, z->direction);
+    z->photocentre_factor = bst_od_photocentre_factor_seen(at.sun, z->direction);
     own->exposure_s[arc->count] = centroid->exposure_ticks / a->tick_rate_hz;
     own->attitude[arc->count++] = from->attitude.q_cam_from_gcrf;
     own->shared = from->attitude.shared;
@@ -311,7 +306,7 @@ static bst_status end_track(bst_ctx *ctx, bst_run_arcs *a, int index, slot *own,
     BST_TRY(eye_at(ctx, a, s, own->tick, &at));
     arc->state.observer = at.observer;
     arc->state.gcrf_from_teme = at.gcrf_from_teme;
-    arc->state.photocentre_factor = photocentre_factor(&at, arc->state.direction);
+    arc->state.photocentre_factor = bst_od_photocentre_factor_seen(at.sun, arc->state.direction);
     for (int i = 0; i < 2 && arc->count > 0; i++) {
         const bst_od_observation *z = &arc->directions[i * (arc->count - 1)];
         bst_sky_rotation sky;

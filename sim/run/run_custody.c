@@ -12,6 +12,7 @@
 #include "sim/run/run_custody_tables.h"
 #include "sim/run/run_new_objects.h"
 #include "tracker/orbit/custody.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 /* directions that an update needs: with fewer the tracker's state is better */
 enum { LEAST_DIRECTIONS = 3 };
@@ -97,8 +98,7 @@ static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, const bst_scen
             c->figures.unknown++;
             continue;
         }
-        /* half the radius of a sphere as large as the object is catalogued, by the phase angle */
-        double photocentre_m = 0.5 * sqrt(info->area_m2 / BST_PI);
+        double photocentre_m = bst_od_photocentre_of_area(info->area_m2);
         bst_status status =
             bst_custody_orbit_init(ctx, elements, offset_s, photocentre_m, &c->orbits[i]);
         if (status != BST_OK) {

@@ -10,6 +10,7 @@
 #include "sim/cli/plugins.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/run/run_directions.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 void bst_run_creation_date(char text[32]) {
     time_t now = time(NULL);
@@ -224,6 +225,8 @@ static bst_status add(bst_ctx *ctx, gathering *g, const bst_io_rows *rows) {
         bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
         measure(g, rows, &light, &o->od);
     }
+    o->od.photocentre_factor =
+        bst_od_photocentre_factor_seen(bst_vec3_unit(bodies.sun_m), o->od.direction);
     g->track.target = g->track.target || bst_io_rows_int(rows, TARGET) != 0;
     if (g->track.count == 1) {
         g->track.exposure_s =

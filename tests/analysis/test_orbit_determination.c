@@ -8,6 +8,7 @@
 #include "tests/stdout_text.h"
 #include "tests/test_support.h"
 #include "tracker/orbit/orbit_initial.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 enum { ANGLES = 5 };
 
@@ -33,6 +34,7 @@ bst_status __wrap_bst_od_determine(bst_ctx *ctx, const bst_od_observation *obser
     assert_int_equal(count, ANGLES);
     bst_assert_close(options->reject_chi2, 25.0, 0);
     assert_true(options->scale_variance);
+    bst_assert_close(options->photocentre_m, 0.5 * 3.0, 0); /* half the radius */
     memcpy(seen, observations, sizeof seen);
     for (int i = 0; i < ANGLES; i++) {
         chi2[i] = 1.0 + i;
@@ -146,6 +148,7 @@ static bst_orbit_determination request_of(const fixture *f) {
                                      .oem = f->oem,
                                      .report = f->report,
                                      .sigma_arcsec = SIGMA_ARCSEC,
+                                     .radius_m = 3.0,
                                      .predict_s = 330,
                                      .reject_chi2 = 25,
                                      .forces = BST_ORBIT_FORCES_TWO_BODY};
@@ -206,6 +209,8 @@ static void expect_observations(bool aberrated) {
                               bst_vec3_add(o->observer.earth_bary_mps, o->observer.velocity_mps)));
         }
         bst_assert_close(bst_vec3_angle(d, o->direction), 0, aberrated ? 2e-8 : 1e-12);
+        const double phase = bst_vec3_angle(bodies.sun_m, bst_vec3_scale(o->direction, -1.0));
+        bst_assert_close(o->photocentre_factor, bst_od_photocentre_factor(phase), 1e-6);
         double variance = SIGMA_ARCSEC * SIGMA_ARCSEC * BST_ARCSEC_RAD * BST_ARCSEC_RAD;
         bst_assert_close(o->cov_11, variance, 1e-9 * variance);
         bst_assert_close(o->cov_22, variance, 1e-9 * variance);
@@ -238,6 +243,7 @@ static void expect_report(const fixture *f, const double elements[6]) {
                    {"covariance_factor", 44.0 / 24},
                    {"epoch_s", 150.25},
                    {"bend", 0.125},
+                   {"radius_m", 3.0},
                    {"range_m", 1.25e6},
                    {"range_sigma_m", 350}};
     for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) {

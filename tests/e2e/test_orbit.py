@@ -229,6 +229,25 @@ class Orbit(unittest.TestCase):
             self.assertEqual(result.returncode, 1)
             self.assertIn(message, result.stderr)
 
+    def test_radius(self):
+        """By the scenario's area, or as given: what a larger one adds grows as its square."""
+        def covariance(*words):
+            report = os.path.join(self.folder, "radius.json")
+            result = call("orbit", self.made, *words, "--report", report)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(report, encoding="utf-8") as file:
+                found = json.load(file)
+            return found["radius_m"], np.array(found["covariance_gcrf"])
+        with open(runs.TRACK, encoding="utf-8") as file:
+            area_m2 = json.load(file)["world"]["objects"][0]["area_m2"]
+        self.assertAlmostEqual(self.report["radius_m"], math.sqrt(area_m2 / math.pi), delta=1e-9)
+        none, small, large = (covariance("--radius", words)[1] for words in ("0", "500", "1000"))
+        self.assertAlmostEqual(covariance("--radius", "0")[0], 0, delta=0)
+        scale = np.sqrt(np.outer(np.diag(large), np.diag(large)))
+        # of numbers written to 17 digits
+        np.testing.assert_allclose((large - none) / scale, 4 * (small - none) / scale, atol=1e-8)
+        self.assertGreater(np.trace((large - none) / scale), 1e-6)
+
     def test_mistakes(self):
         for words, code, message in (
                 ((self.made, "--track", "77"), 1, "holds no confirmed track 77"),
@@ -236,7 +255,12 @@ class Orbit(unittest.TestCase):
                 ((), 2, "one folder of a run, or a TDM, is expected"),
                 ((self.folder + "/none",), 1, "none"),
                 ((self.made, "--track", "0"), 2, "--track"),
-                ((self.made, "--oem", self.folder), 2, self.folder)):
+                ((self.made, "--oem", self.folder), 2, self.folder),
+                ((self.made, "--radius", "-1"), 2, "--radius"),
+                # a run has observer, errors and aberration of its own
+                *(((self.made, "--" + name, value), 2, f"--{name} is for angles of a TDM, and {self.made} is a run")
+                  for name, value in (("observer", self.files["oem"]), ("observer-name", "neossat"), ("object", "X"),
+                                      ("sigma", "1"), ("aberration", "removed"), ("aberration", "contained")))):
             result = call("orbit", *words)
             self.assertEqual(result.returncode, code, result.stderr)
             self.assertIn(message, result.stderr)

@@ -7,6 +7,7 @@
 #include "sim/onboard/knowledge.h"
 #include "sim/run/run_observations.h"
 #include "tests/report/run_tables.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 enum { FRAMES = 4 };
 
@@ -229,6 +230,8 @@ static void measured_and_filtered(void **state) {
         bst_assert_close(
             bst_vec3_norm(bst_vec3_sub(o->od.observer.earth_bary_mps, bodies.earth_bary_mps)), 0,
             1e-6);
+        const double phase = bst_vec3_angle(bodies.sun_m, bst_vec3_scale(o->od.direction, -1.0));
+        bst_assert_close(o->od.photocentre_factor, bst_od_photocentre_factor(phase), 1e-6);
         bst_assert_close(o->v_mag, 12.5 + k, 0);
         bst_assert_close(o->snr, 30.0 + k, 0);
         expect_measured(bst_knowledge_camera(knowledge), &o->od, k);

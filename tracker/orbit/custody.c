@@ -8,6 +8,7 @@
 #include "sim/core/tangent.h"
 #include "tracker/orbit/arc_outliers.h"
 #include "tracker/orbit/custody_motion.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 enum {
     N = BST_CUSTODY_STATE,
@@ -61,28 +62,18 @@ static bool residuals(const bst_custody_orbit *o, const double x[N], const measu
     return true;
 }
 
-double bst_custody_photocentre_factor(double phase_rad) {
-    /* 0/0 at pi, where it is 9 pi / 32 radii */
-    const double a = fmin(fmax(phase_rad, 0.0), BST_PI - 1e-3), s = sin(a), c = cos(a);
-    const double radii = 3.0 * BST_PI / 16.0 * s * (1.0 + c) / (s + (BST_PI - a) * c);
-    return fmax(radii * sqrt(0.5) / 0.5, 0.2);
-}
-
 /* Standard deviation of the photocentre in a direction, rad. */
 static double photocentre_rad(const bst_custody_orbit *o, double factor, double range_m) {
-    return (factor > 0.0 ? factor : 1.0) * o->photocentre_m / range_m;
+    return bst_od_photocentre_rad(o->photocentre_m, factor, range_m);
 }
 
-/* Correlation of the photocentre's displacement at two directions of a pass. It turns with the line
- * of sight and grows with the phase angle, by about itself in a radian; as the object goes round,
- * both change by its rate at perigee at most beside the line of sight's own turn. */
+/* Correlation of the photocentre's displacement at two directions of a pass. */
 static double photocentre_correlation(const bst_custody_orbit *o, const bst_od_observation *a,
                                       const bst_od_observation *b) {
     const double e = o->elements.eccentricity, n = o->elements.mean_motion_radpmin / 60.0;
     const double rate = n * sqrt((1.0 + e) / (1.0 - e)) / (1.0 - e);
     const double turn = rate * (b->observer.time_s - a->observer.time_s);
-    const bst_vec3 between = bst_vec3_sub(b->direction, a->direction);
-    return exp(-0.5 * (turn * turn + bst_vec3_dot(between, between)));
+    return bst_od_photocentre_correlation(turn, a->direction, b->direction);
 }
 
 /* Covariance of the measurement's errors, with that of the photocentre. */

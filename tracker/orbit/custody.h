@@ -47,7 +47,7 @@ typedef struct bst_custody_orbit {
     double epoch_offset_s; /* time 0 minus the epoch of the elements */
     double a_m;            /* semi-major axis */
     /* standard deviation of the photocentre from the centre of mass along each axis, m, where
-     * bst_custody_photocentre_factor is 1 */
+     * bst_od_photocentre_factor is 1 */
     double photocentre_m;
 } bst_custody_orbit;
 
@@ -69,14 +69,6 @@ typedef struct bst_custody_observation {
     /* factor on the standard deviation of the photocentre; 0: not known, it is taken for 1 */
     double photocentre_factor;
 } bst_custody_observation;
-
-/* Standard deviation of the photocentre of a Lambertian sphere along each axis at a phase angle,
- * over half the sphere's radius. At least 0.2: satellites are no spheres.
- *
- * Notes:     the displacement towards the Sun is 3 pi / 16 sin a (1 + cos a) / (sin a + (pi - a)
- *            cos a) radii; its square is shared by two axes, as the shape is not known
- * Reference: the integral of a Lambertian sphere's radiance over what is lit and seen */
-double bst_custody_photocentre_factor(double phase_rad);
 
 /* An observation as a filter predicts it. */
 typedef struct bst_custody_prediction {

@@ -4,24 +4,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/astro/bodies.h"
+#include "sim/astro/sgp4_fit.h"
 #include "sim/core/cholesky.h"
 #include "sim/core/compare.h"
 #include "sim/core/tangent.h"
+#include "tracker/orbit/orbit_chart.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 enum { PARAMETERS = 6, MAX_ITERATIONS = 60, MAX_ROUNDS = 6 };
 
 /* Largest 1 sigma of the logarithm of range for which the range counts as determined. */
 static const double MOST_LOG_SIGMA = 0.5;
-
-/* Orbit state in coordinates of the mid-arc observer: r = R + range q, v = V + range (u q + w),
- * with R and V the observer's state. Steps are (direction along two axes, rate times span along the
- * same axes, ln range, u times span): all are angles. */
-typedef struct chart {
-    const bst_od_observer *observer;
-    double span_s;
-    bst_vec3 q, w; /* unit direction; its rate, perpendicular */
-    double range_m, u_ps;
-} chart;
 
 typedef struct work {
     bst_ctx *ctx;
@@ -30,68 +24,11 @@ typedef struct work {
     const bst_od_options *options;
     bool *used;
     double (*white)[3];             /* inverse Cholesky factor of each covariance: 11, 21, 22 */
+    double *range_m;                /* to the object at the latest state */
     double (*residual)[2];          /* whitened, at the current state */
     double (*side[2])[2];           /* whitened, at displaced states */
     double (*slope)[PARAMETERS][2]; /* d(residual)/d(step) */
 } work;
-
-/* Coordinates of a state as the mid-arc observer sees it. */
-static chart chart_of(const bst_od_observer *observer, double span_s, const bst_od_state *s) {
-    chart c = {.observer = observer, .span_s = span_s};
-    bst_vec3 line = bst_vec3_sub(s->position_m, observer->position_m);
-    bst_vec3 rate = bst_vec3_sub(s->velocity_mps, observer->velocity_mps);
-    c.range_m = bst_vec3_norm(line);
-    c.q = bst_vec3_unit(line);
-    c.u_ps = bst_vec3_dot(c.q, rate) / c.range_m;
-    c.w = bst_vec3_scale(bst_tangent_project(c.q, rate), 1.0 / c.range_m);
-    return c;
-}
-
-/* State of given coordinates. */
-static bst_od_state state_of(const chart *c) {
-    bst_vec3 rate = bst_vec3_axpy(c->w, c->u_ps, c->q);
-    return (bst_od_state){
-        .time_s = c->observer->time_s,
-        .position_m = bst_vec3_axpy(c->observer->position_m, c->range_m, c->q),
-        .velocity_mps = bst_vec3_axpy(c->observer->velocity_mps, c->range_m, rate)};
-}
-
-/* Coordinates after a step. */
-static chart moved(const chart *c, const double step[PARAMETERS]) {
-    bst_tangent axes = bst_tangent_at(c->q);
-    chart out = *c;
-    out.q = bst_tangent_exp(c->q, bst_tangent_vector(&axes, step[0], step[1]));
-    bst_vec3 w =
-        bst_vec3_add(c->w, bst_tangent_vector(&axes, step[2] / c->span_s, step[3] / c->span_s));
-    out.w = bst_tangent_carry(c->q, out.q, w);
-    out.range_m = c->range_m * exp(step[4]);
-    out.u_ps = c->u_ps + step[5] / c->span_s;
-    return out;
-}
-
-/* Jacobian of (r, v) by the coordinate steps. */
-static void chart_jacobian(const chart *c, double out[6][PARAMETERS]) {
-    bst_tangent axes = bst_tangent_at(c->q);
-    const bst_vec3 e[2] = {axes.e1, axes.e2};
-    bst_vec3 rate = bst_vec3_axpy(c->w, c->u_ps, c->q);
-    bst_vec3 r[PARAMETERS] = {{0}}, v[PARAMETERS] = {{0}};
-    for (int k = 0; k < 2; k++) {
-        r[k] = bst_vec3_scale(e[k], c->range_m);
-        v[k] = bst_vec3_scale(
-            bst_vec3_axpy(bst_vec3_scale(e[k], c->u_ps), -bst_vec3_dot(c->w, e[k]), c->q),
-            c->range_m);
-        v[2 + k] = bst_vec3_scale(e[k], c->range_m / c->span_s);
-    }
-    r[4] = bst_vec3_scale(c->q, c->range_m);
-    v[4] = bst_vec3_scale(rate, c->range_m);
-    v[5] = bst_vec3_scale(c->q, c->range_m / c->span_s);
-    for (int k = 0; k < PARAMETERS; k++) {
-        const double column[6] = {r[k].x, r[k].y, r[k].z, v[k].x, v[k].y, v[k].z};
-        for (int i = 0; i < 6; i++) {
-            out[i][k] = column[i];
-        }
-    }
-}
 
 /* ------------------------------------------------------------------ Residuals */
 
@@ -107,6 +44,7 @@ static bst_status residual_at(work *w, const bst_od_path *path, int i, double ou
     double a = bst_vec3_dot(axes.e1, off), b = bst_vec3_dot(axes.e2, off);
     out[0] = w->white[i][0] * a;
     out[1] = w->white[i][1] * a + w->white[i][2] * b;
+    w->range_m[i] = sight.range_m;
     return BST_OK;
 }
 
@@ -141,7 +79,7 @@ static double total_chi2(const work *w, double (*r)[2]) {
 
 /* Jacobian of the residuals by central differences; by differences to one side in a fit that ends
  * early, which needs no covariance to many digits. */
-static bst_status residual_jacobian(work *w, const chart *c) {
+static bst_status residual_jacobian(work *w, const bst_od_chart *c) {
     /* the effect of a range displacement grows with the arc: the step is reduced to stay linear */
     double fine = 1e-4 / (1.0 + c->span_s / 600.0);
     const double step[PARAMETERS] = {1e-5, 1e-5, 1e-5, 1e-5, fine, fine};
@@ -150,8 +88,8 @@ static bst_status residual_jacobian(work *w, const chart *c) {
         for (int s = 0; s < (one_sided ? 1 : 2); s++) {
             double x[PARAMETERS] = {0.0};
             x[k] = s ? -step[k] : step[k];
-            chart near = moved(c, x);
-            bst_od_state state = state_of(&near);
+            bst_od_chart near = bst_od_chart_moved(c, x);
+            bst_od_state state = bst_od_chart_state(&near);
             BST_TRY(residuals(w, &state, w->side[s]));
         }
         double(*const low)[2] = one_sided ? w->residual : w->side[1];
@@ -263,8 +201,9 @@ static bst_status fail_to_converge(const work *w, const double n[PARAMETERS][PAR
 static const double MOST_DAMPING = 1.0;
 
 /* Levenberg-Marquardt iteration over the observations in use. */
-static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], int *iterations) {
-    bst_od_state state = state_of(c);
+static bst_status minimise(work *w, bst_od_chart *c, double n[PARAMETERS][PARAMETERS],
+                           int *iterations) {
+    bst_od_state state = bst_od_chart_state(c);
     BST_TRY(residuals(w, &state, w->residual));
     double cost = total_chi2(w, w->residual), damping = 1e-3;
     const int most = most_iterations(w->options);
@@ -286,8 +225,8 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
             }
             linear_gain = attempt == 0 && damping <= MOST_DAMPING ? predicted : linear_gain;
             limit_step(x);
-            chart next = moved(c, x);
-            state = state_of(&next);
+            bst_od_chart next = bst_od_chart_moved(c, x);
+            state = bst_od_chart_state(&next);
             bst_status status = residuals(w, &state, w->side[0]);
             double then = status == BST_OK ? total_chi2(w, w->side[0]) : INFINITY;
             if (then <= cost) {
@@ -396,6 +335,60 @@ static void add_shared_errors(const work *w, const double l[PARAMETERS][PARAMETE
     }
 }
 
+/* Largest rate of an orbit around the Earth: at its perigee, which is above the ground. */
+static double largest_rate_radps(const work *w, const bst_od_state *s) {
+    const bst_vec3 momentum = bst_vec3_cross(s->position_m, s->velocity_mps);
+    const bst_astro_kepler_elements k = bst_astro_kepler_elements_of(
+        bst_od_gm(&w->options->motion), s->position_m, s->velocity_mps);
+    const double perigee_m = fmax(k.semi_major_axis_m * (1.0 - k.eccentricity), BST_EARTH_RADIUS_M);
+    return bst_vec3_norm(momentum) / (perigee_m * perigee_m);
+}
+
+/* Adds the effect of the photocentre's displacement to the covariance, as consider parameters along
+ * the axes of GCRF: N^-1 B N^-1 with B the covariance that they give the normal equations. */
+static bst_status add_photocentre(const work *w, const bst_od_state *state,
+                                  const double l[PARAMETERS][PARAMETERS],
+                                  const double size[PARAMETERS], double p[PARAMETERS][PARAMETERS]) {
+    double b[PARAMETERS][PARAMETERS], half[PARAMETERS][PARAMETERS], column[PARAMETERS];
+    bst_od_photocentre_effect *items = calloc((size_t)w->count, sizeof *items);
+    if (!items) {
+        return bst_fail(w->ctx, BST_ERR_MEMORY, "out of memory for %d observations", w->count);
+    }
+    for (int i = 0; i < w->count; i++) {
+        const bst_od_observation *o = &w->items[i];
+        const double *white = w->white[i];
+        const double sigma =
+            bst_od_photocentre_rad(w->options->photocentre_m, o->photocentre_factor, w->range_m[i]);
+        const bst_tangent axes = bst_tangent_at(o->direction);
+        const double e1[3] = {axes.e1.x, axes.e1.y, axes.e1.z};
+        const double e2[3] = {axes.e2.x, axes.e2.y, axes.e2.z};
+        items[i].time_s = o->observer.time_s;
+        items[i].direction = o->direction;
+        for (int c = 0; c < 3 && w->used[i]; c++) {
+            const double r0 = white[0] * e1[c], r1 = white[1] * e1[c] + white[2] * e2[c];
+            for (int k = 0; k < PARAMETERS; k++) {
+                items[i].rhs[c][k] = sigma * (w->slope[i][k][0] * r0 + w->slope[i][k][1] * r1);
+            }
+        }
+    }
+    bst_od_photocentre_covariance(items, w->count, largest_rate_radps(w, state), b);
+    free(items);
+    for (int k = 0; k < PARAMETERS; k++) { /* B is symmetric: its rows are its columns */
+        solve(l, size, b[k], half[k]);
+    }
+    for (int k = 0; k < PARAMETERS; k++) {
+        double across[PARAMETERS];
+        for (int i = 0; i < PARAMETERS; i++) {
+            across[i] = half[i][k];
+        }
+        solve(l, size, across, column);
+        for (int i = 0; i < PARAMETERS; i++) {
+            p[i][k] += column[i];
+        }
+    }
+    return BST_OK;
+}
+
 /* Covariance of the coordinate steps: independent errors times the variance factor, plus shared
  * errors. */
 static void covariance_of_steps(const work *w, const double l[PARAMETERS][PARAMETERS],
@@ -434,8 +427,8 @@ static void count_residuals(work *w, bst_od_solution *out) {
 }
 
 /* Converts the fit to a solution: state, covariance, range sigma. */
-static bst_status finish_solution(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
-                                  bst_od_solution *out) {
+static bst_status finish_solution(work *w, const bst_od_chart *c,
+                                  const double n[PARAMETERS][PARAMETERS], bst_od_solution *out) {
     double l[PARAMETERS][PARAMETERS], size[PARAMETERS], p[PARAMETERS][PARAMETERS];
     double map[6][PARAMETERS];
     if (!factor_damped(n, 0.0, 1e-15, l, size)) {
@@ -443,7 +436,11 @@ static bst_status finish_solution(work *w, const chart *c, const double n[PARAME
     }
     count_residuals(w, out);
     covariance_of_steps(w, (const double(*)[PARAMETERS])l, size, out->variance_factor, p);
-    chart_jacobian(c, map);
+    out->state = bst_od_chart_state(c);
+    if (w->options->photocentre_m > 0.0) {
+        BST_TRY(add_photocentre(w, &out->state, (const double(*)[PARAMETERS])l, size, p));
+    }
+    bst_od_chart_jacobian(c, map);
     for (int i = 0; i < 6; i++) {
         for (int j = 0; j <= i; j++) {
             double sum = 0.0;
@@ -455,7 +452,6 @@ static bst_status finish_solution(work *w, const chart *c, const double n[PARAME
             out->covariance[i][j] = out->covariance[j][i] = sum;
         }
     }
-    out->state = state_of(c);
     out->range_m = c->range_m;
     double log_sigma = sqrt(p[4][4]);
     out->range_sigma_m = c->range_m * log_sigma;
@@ -468,7 +464,7 @@ static bst_status finish_solution(work *w, const chart *c, const double n[PARAME
 
 /* Nonlinearity of the fit: relative departure of the sum of squares from the covariance's
  * prediction, two standard deviations of range along the valley; 0 if linear. */
-static double nonlinearity(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
+static double nonlinearity(work *w, const bst_od_chart *c, const double n[PARAMETERS][PARAMETERS],
                            const bst_od_solution *s) {
     double l[PARAMETERS][PARAMETERS], size[PARAMETERS], column[PARAMETERS], worst = 0.0;
     const double range[PARAMETERS] = {[4] = 1.0};
@@ -481,8 +477,8 @@ static double nonlinearity(work *w, const chart *c, const double n[PARAMETERS][P
         for (int i = 0; i < PARAMETERS; i++) {
             x[i] = side * column[i] / sqrt(column[4]);
         }
-        chart there = moved(c, x);
-        bst_od_state state = state_of(&there);
+        bst_od_chart there = bst_od_chart_moved(c, x);
+        bst_od_state state = bst_od_chart_state(&there);
         bst_ctx *ctx = w->ctx;
         bst_ctx quiet = {0};
         w->ctx = &quiet;
@@ -506,7 +502,7 @@ static bst_status fit_rounds(work *w, const bst_od_state *first, double *scratch
     bst_status status = bst_od_path_state(w->ctx, path, middle->time_s, &there);
     bst_od_path_free(path);
     BST_TRY(status);
-    chart c = chart_of(middle, fmax(0.5 * (end - start), 1.0), &there);
+    bst_od_chart c = bst_od_chart_of(middle, fmax(0.5 * (end - start), 1.0), &there);
     double n[PARAMETERS][PARAMETERS];
     out->iterations = 0;
     bool changed = true;
@@ -543,6 +539,7 @@ bst_status bst_od_fit(bst_ctx *ctx, const bst_od_observation *observations, int 
               .options = options,
               .used = malloc(n * sizeof *w.used),
               .white = malloc(n * sizeof *w.white),
+              .range_m = malloc(n * sizeof *w.range_m),
               .residual = malloc(n * sizeof *w.residual),
               .side = {malloc(n * sizeof *w.residual), malloc(n * sizeof *w.residual)},
               .slope = malloc(n * sizeof *w.slope)};
@@ -553,7 +550,8 @@ bst_status bst_od_fit(bst_ctx *ctx, const bst_od_observation *observations, int 
         w.middle = now < fabs(observations[w.middle].observer.time_s - middle) ? i : w.middle;
     }
     bst_status status = BST_OK;
-    if (!w.used || !w.white || !w.residual || !w.side[0] || !w.side[1] || !w.slope || !scratch) {
+    if (!w.used || !w.white || !w.range_m || !w.residual || !w.side[0] || !w.side[1] || !w.slope ||
+        !scratch) {
         status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d observations", count);
     }
     status = status == BST_OK ? check(&w) : status;
@@ -563,6 +561,7 @@ bst_status bst_od_fit(bst_ctx *ctx, const bst_od_observation *observations, int 
     }
     free(w.used);
     free(w.white);
+    free(w.range_m);
     free(w.residual);
     free(w.side[0]);
     free(w.side[1]);

@@ -16,7 +16,7 @@ typedef struct bst_od_observation {
      * observation is exp(-shared_change); 0: the same for the whole arc. It is not fitted, but
      * increases the covariance. */
     double shared_rad[2][2], shared_change;
-    double photocentre_factor; /* bst_custody_photocentre_factor; the fit does not use it */
+    double photocentre_factor; /* bst_od_photocentre_factor; 0: not known, taken for 1 */
 } bst_od_observation;
 
 typedef struct bst_od_options {
@@ -27,6 +27,9 @@ typedef struct bst_od_options {
     /* estimate one factor on the covariances from the residuals (see
      * bst_od_solution.variance_factor); false: they are taken as true */
     bool scale_variance;
+    /* Standard deviation of the photocentre from the centre of mass along each axis of GCRF where
+     * its factor is 1, m. It is not fitted, but increases the covariance; 0: none */
+    double photocentre_m;
     /* share of chi-square below which a decrease that the linear model predicts ends the iteration;
      * 0: 1e-9. A start for another fit, or a comparison with a limit, needs no more than 1e-3 */
     double least_gain;
@@ -65,7 +68,8 @@ enum {
  * Levenberg-Marquardt in coordinates that angles determine well, seen from the mid-arc observer:
  * direction and rate, logarithm of range, range rate over range. The valley of short arcs is
  * straight in them. Derivatives are central differences of the motion. The covariance is the
- * inverse normal matrix, transformed to GCRF.
+ * inverse normal matrix, transformed to GCRF; shared errors and the photocentre's displacement are
+ * consider parameters.
  *
  * Given:     observations   in order of time (equal times allowed)
  * Returned:  residual_chi2  [count] chi-square of each observation, rejected ones included; may be

@@ -73,7 +73,10 @@ static bst_status choose_in_run(bst_ctx *ctx, const bst_orbit_request *q, const 
     BST_TRY(choose(ctx, q, &out->scene, out));
     bst_track_object(&out->track, object, sizeof object);
     int index = bst_world_find_object(out->scene.world, object);
-    out->norad = index >= 0 ? bst_world_object(out->scene.world, index)->norad : 0;
+    if (index >= 0) {
+        out->norad = bst_world_object(out->scene.world, index)->norad;
+        out->area_m2 = bst_world_object(out->scene.world, index)->area_m2;
+    }
     out->motion = motion_of(out->scene.world, index);
     out->epoch = out->scene.scenario.epoch;
     return BST_OK;

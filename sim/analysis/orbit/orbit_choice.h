@@ -19,6 +19,7 @@ typedef struct bst_orbit_choice {
     bst_run_sensor sensor;
     bst_time epoch; /* time zero of the observations */
     int norad;      /* 0: unknown */
+    double area_m2; /* cross-section of the object in the scenario; 0: unknown */
     bst_run_reader *run;
     bst_run_scene scene; /* scene.world NULL: from a TDM */
     bst_world_motion_law

@@ -18,6 +18,7 @@
 #include "sim/io/tdm_writer.h"
 #include "sim/run/track_files.h"
 #include "tracker/orbit/orbit_initial.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 /* ------------------------------------------------------------------ the orbit */
 
@@ -256,6 +257,7 @@ static bst_status write_report(bst_ctx *ctx, const orbit *o, FILE *stream) {
     bst_json_add_number(node, "chi2_stated", s->chi2);
     cJSON_AddNumberToObject(node, "dof", s->dof);
     bst_json_add_number(node, "covariance_factor", s->variance_factor);
+    bst_json_add_number(node, "radius_m", 2.0 * o->options.photocentre_m);
     bst_time_to_utc(time_at(o, s->state.time_s), 9, utc, sizeof utc);
     cJSON_AddStringToObject(node, "epoch_utc", utc);
     bst_json_add_number(node, "epoch_s", s->state.time_s);
@@ -330,6 +332,8 @@ static void print_orbit(const orbit *o) {
            s->dof > 0 ? s->chi2 / s->dof : 0.0);
     printf("  covariance      %12.3f times what the measurements state, by their residuals\n",
            s->variance_factor);
+    printf("  radius          %12.3f m, by which the centre of light may be off that of mass\n",
+           2.0 * o->options.photocentre_m);
     printf("  motion          %12s\n", o->model);
     printf("  epoch        %s\n", utc);
     printf("  position, GCRF  %.6f %.6f %.6f km, +- %.3f km\n", r.x * 1e-3, r.y * 1e-3, r.z * 1e-3,
@@ -373,9 +377,19 @@ static bst_status determine(bst_ctx *ctx, const bst_orbit_determination *q, orbi
     return write_file(ctx, o, q->report, write_report);
 }
 
+const char *bst_orbit_tdm_option(const bst_orbit_determination *q) {
+    const bst_tdm_request *a = &q->choice.angles;
+    return a->observer                                     ? "observer"
+           : a->observer_name                              ? "observer-name"
+           : a->object                                     ? "object"
+           : q->sigma_arcsec > 0.0                         ? "sigma"
+           : q->aberration != BST_ORBIT_ABERRATION_DEFAULT ? "aberration"
+                                                           : NULL;
+}
+
 bst_status bst_orbit_determine(bst_ctx *ctx, const bst_orbit_determination *q, const char *path) {
     bst_orbit_request wanted = q->choice;
-    wanted.angles.sigma_rad = q->sigma_arcsec * BST_ARCSEC_RAD;
+    wanted.angles.sigma_rad = (q->sigma_arcsec > 0.0 ? q->sigma_arcsec : 1.0) * BST_ARCSEC_RAD;
     wanted.angles.aberrated = q->aberration == BST_ORBIT_ABERRATION_CONTAINED;
     bst_orbit_choice c = {.items = NULL};
     orbit o = {.request = q, .track = &c.track};
@@ -383,6 +397,8 @@ bst_status bst_orbit_determine(bst_ctx *ctx, const bst_orbit_determination *q, c
     o.epoch = c.epoch;
     o.norad = c.norad;
     o.motion = c.motion;
+    o.options.photocentre_m =
+        q->radius_m < 0.0 ? bst_od_photocentre_of_area(c.area_m2) : 0.5 * q->radius_m;
     o.eop = c.scene.world ? bst_world_earth_orientation(c.scene.world) : NULL;
     status = status == BST_OK ? determine(ctx, q, &o) : status;
     bst_od_path_free(o.path);

@@ -42,6 +42,14 @@ const bst_option bst_orbit_options[] = {
      .argument = "removed|contained",
      .doc = "TDM: whether the observer's stellar aberration is still in the angles (default "
             "removed)"},
+    {.name = "radius",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_orbit_command, determination.radius_m),
+     .argument = "M",
+     .doc = "radius of the object, by which its centre of light may be off its centre of mass "
+            "(default: a sphere of the object's area_m2 in the scenario; TDM: 0, no offset)",
+     .minimum = 0,
+     .maximum = 1000},
     {.name = "forces",
      .kind = BST_OPTION_CHOICE,
      .offset = offsetof(bst_orbit_command, determination.forces),

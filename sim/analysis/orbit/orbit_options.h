@@ -12,9 +12,13 @@ typedef struct bst_orbit_command {
 } bst_orbit_command;
 
 /* Request without any option given. */
-#define BST_ORBIT_COMMAND_DEFAULTS                                   \
-    {                                                                \
-        .determination = {.reject_chi2 = 30.0, .sigma_arcsec = 1.0 } \
+#define BST_ORBIT_COMMAND_DEFAULTS                     \
+    {                                                  \
+        .determination = {                             \
+            .reject_chi2 = 30.0,                       \
+            .radius_m = -1.0,                          \
+            .aberration = BST_ORBIT_ABERRATION_DEFAULT \
+        }                                              \
     }
 
 /* Table of the options, with offsets in a bst_orbit_command. */

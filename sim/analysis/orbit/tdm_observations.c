@@ -8,6 +8,7 @@
 #include "sim/astro/bodies.h"
 #include "sim/astro/oem.h"
 #include "sim/astro/tdm.h"
+#include "tracker/orbit/orbit_photocentre.h"
 
 static bool is_same(const bst_tdm_pair *a, const bst_tdm_pair *b) {
     return strcmp(a->observer, b->observer) == 0 && strcmp(a->object, b->object) == 0;
@@ -73,6 +74,8 @@ static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const sources
         bst_light light = bst_light_at(&bodies, eye->position_m, eye->velocity_mps);
         o->od.direction = bst_light_unaberrate(&light, o->od.direction);
     }
+    o->od.photocentre_factor =
+        bst_od_photocentre_factor_seen(bst_vec3_unit(bodies.sun_m), o->od.direction);
     return BST_OK;
 }
 
