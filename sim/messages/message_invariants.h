@@ -31,7 +31,7 @@ bool bst_sensor_command_is_valid(const bst_sensor_command *command);
 bool bst_regions_of_interest_are_valid(const bst_regions_of_interest *regions, int capacity);
 /* Wheels: at most `capacity`, with finite speeds and torques, and limits of 0 or more. */
 bool bst_wheel_status_is_valid(const bst_wheel_status *status, int capacity);
-/* A bst_mode and finite errors. */
+/* A bst_mode, no negative target or step of a search. */
 bool bst_control_status_is_valid(const bst_control_status *status);
 /* A task: object -1 or more, standard deviations of 0 or more, a bst_task_end. */
 bool bst_task_is_valid(const bst_task *task);

@@ -5,6 +5,7 @@
 #include "boresight/vec.h"
 #include "sim/analysis/orbit/orbit_determination.h"
 #include "sim/astro/bodies.h"
+#include "sim/astro/sgp4_fit.h"
 #include "tests/stdout_text.h"
 #include "tests/test_support.h"
 #include "tracker/orbit/orbit_initial.h"
@@ -42,6 +43,20 @@ bst_status __wrap_bst_od_determine(bst_ctx *ctx, const bst_od_observation *obser
     *out = solution;
     *report = (bst_od_report){.method = BST_OD_GAUSS, .first_chi2 = 4.0, .other_chi2 = 100.0};
     return BST_OK;
+}
+
+enum { PLACES = 73 };
+static bst_sgp4_place fitted[PLACES]; /* by the mean elements */
+
+bst_status __real_bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, bst_vec3 r,
+                               bst_vec3 v, bst_elements *elements, double *rms_m);
+bst_status __wrap_bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, bst_vec3 r,
+                               bst_vec3 v, bst_elements *elements, double *rms_m);
+bst_status __wrap_bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, bst_vec3 r,
+                               bst_vec3 v, bst_elements *elements, double *rms_m) {
+    assert_int_equal(count, PLACES);
+    memcpy(fitted, places, sizeof fitted);
+    return __real_bst_sgp4_fit(ctx, places, count, r, v, elements, rms_m);
 }
 
 /* The observer's circle, inclined by 30 degrees about x. */
@@ -408,11 +423,53 @@ static void mean_elements(void **state) {
     bst_assert_close(inclination_deg, elements[2] * 180 / BST_PI, 0.3);
 }
 
+/* Distance from the Earth's centre on Kepler's orbit through the solution, seconds later. */
+static double distance_at(double seconds) {
+    double e[6];
+    elements_of(solution.state.position_m, solution.state.velocity_mps, e);
+    double mean = e[5] + sqrt(MU / (e[0] * e[0] * e[0])) * seconds, eccentric = mean;
+    for (int i = 0; i < 50; i++) {
+        eccentric = mean + e[1] * sin(eccentric);
+    }
+    return e[0] * (1.0 - e[1] * cos(eccentric));
+}
+
+/* Mean elements are fitted to a revolution about the epoch, or to the arc if that reaches farther
+ * to either side: of angles from 0 to 630 s. */
+static void arc_of_mean_elements(void **state) {
+    fixture *f = *state;
+    static const double epochs_s[] = {150.25, -4400.25, 5000.25};
+    for (int k = 0; k < 3; k++) {
+        bst_ctx ctx = {0};
+        bst_stdout_text out;
+        char text[4000];
+        double e[6];
+        bst_orbit_determination q = request_of(f);
+        q.omm = f->omm;
+        q.oem = NULL;
+        solution.state.time_s = epochs_s[k];
+        elements_of(solution.state.position_m, solution.state.velocity_mps, e);
+        double half = BST_PI * sqrt(e[0] * e[0] * e[0] / MU);
+        half = k == 0 ? half : k == 1 ? 630 + 4400.25 : 5000.25;
+        bst_stdout_take(&out);
+        bst_status status = bst_orbit_determine(&ctx, &q, f->tdm);
+        bst_stdout_give(&out, text, sizeof text);
+        bst_assert_ok(&ctx, status);
+        for (int i = 0; i < PLACES; i++) {
+            double seconds = half * (i - PLACES / 2) / (PLACES / 2);
+            /* constants of the Earth: 1e-9; the path is integrated */
+            bst_assert_close(60.0 * fitted[i].minutes, seconds, 1e-6 * half);
+            bst_assert_close(bst_vec3_norm(fitted[i].position_teme_m), distance_at(seconds), 1.0);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_solution_of_two_bodies, set_up, tear_down),
         cmocka_unit_test_setup_teardown(notes_and_aberration, set_up, tear_down),
         cmocka_unit_test_setup_teardown(mean_elements, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(arc_of_mean_elements, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

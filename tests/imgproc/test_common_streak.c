@@ -1,6 +1,6 @@
 /* The common streak of a frame: shape, ends and stars from the pixels alone. */
 #include "boresight/rng.h"
-#include "imgproc/streak/common_streak.h"
+#include "imgproc/streak/common_streak_internal.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 240, STARS = 9 };
@@ -250,6 +250,102 @@ static void ends_of_a_long_path(void **state) {
     bst_streak_finder_free(finder);
 }
 
+/* The cleaned image of pixels; to be freed. */
+static bst_streak_finder *clean(scene *s) {
+    const bst_common_streak_options options = {
+        .max_sources = 4, .least_snr = 15.0, .known_path = true};
+    bst_streak_finder *f;
+    bst_assert_ok(&s->ctx, bst_streak_finder_create(&s->ctx, s->pixels, SIDE, SIDE, &options, &f));
+    return f;
+}
+
+/* Mean and standard deviation in a box. */
+static void moments(const bst_streak_finder *f, int x0, int x1, int y0, int y1, double out[2]) {
+    double sum = 0.0, square = 0.0, n = (double)(x1 - x0) * (y1 - y0);
+    for (int y = y0; y < y1; y++) {
+        for (int x = x0; x < x1; x++) {
+            double v = (double)f->image[y * SIDE + x];
+            sum += v;
+            square += v * v;
+        }
+    }
+    out[0] = sum / n;
+    out[1] = sqrt(square / n - out[0] * out[0]);
+}
+
+/* Levels of columns and of rows are removed, noise becomes 1, and what no PSF makes is cleared. */
+static void levels_of_columns_and_rows(void **state) {
+    (void)state;
+    static scene drawn, *s = &drawn;
+    draw(s, 0.0, 0.0);
+    for (int y = 0; y < SIDE; y++) {
+        for (int x = 0; x < SIDE; x++) {
+            double level = 40.0 * uniform((uint64_t)x, 8) + 6.0 * uniform((uint64_t)y, 9);
+            double noise = (double)s->pixels[y * SIDE + x] - 100.0 - 0.5 * x;
+            s->pixels[y * SIDE + x] = (float)(3.0 * noise + level);
+        }
+    }
+    s->pixels[5 * SIDE + 7] = NAN;
+    s->pixels[50 * SIDE + 7] = -30000.0f;
+    s->pixels[40 * SIDE + 30] += 300.0f; /* 100 sigma alone: hot */
+    for (int k = 0; k < 2; k++) {
+        s->pixels[80 * SIDE + 30 + k] += 300.0f; /* as much in two pixels: light */
+        s->pixels[(120 + k) * SIDE + 30] += 300.0f;
+    }
+    bst_streak_finder *f = clean(s);
+    double m[2];
+    bst_assert_close(f->sigma, 3.0, 0.06); /* 57,600 pixels: 0.6 %, 1 sigma */
+    for (int k = 0; k < SIDE; k++) {       /* medians of 240 are known to 0.08, means to 0.1 */
+        moments(f, k, k + 1, 130, SIDE, m);
+        bst_assert_close(m[0], 0.0, 0.6);
+        moments(f, 40, SIDE, k, k + 1, m);
+        bst_assert_close(m[0], 0.0, 0.6);
+    }
+    moments(f, 100, 240, 0, SIDE, m);
+    bst_assert_close(m[1], 1.0, 0.02);
+    assert_true(f->image[5 * SIDE + 7] == 0.0f && f->image[50 * SIDE + 7] == -5.0f);
+    assert_true(f->image[40 * SIDE + 30] == 0.0f);
+    for (int k = 0; k < 2; k++) {
+        bst_assert_close((double)f->image[80 * SIDE + 30 + k], 100.0, 5.0);
+        bst_assert_close((double)f->image[(120 + k) * SIDE + 30], 100.0, 5.0);
+    }
+    bst_streak_finder_free(f);
+}
+
+/* A glow of a corner, of unequal slopes, is removed between the middles of its cells, and noise
+ * that is greater elsewhere is reduced; without a glow that stays as it is. */
+static void glow_of_a_corner(void **state) {
+    (void)state;
+    static scene drawn, *s = &drawn;
+    for (int glow = 0; glow < 2; glow++) {
+        draw(s, 0.0, 0.0);
+        for (int y = 0; y < SIDE; y++) {
+            for (int x = 0; x < SIDE; x++) {
+                float *at = &s->pixels[y * SIDE + x];
+                double noise = (double)*at - 100.0 - 0.5 * x;
+                noise = isfinite(noise) && fabs(noise) < 10.0 ? noise : 0.0;
+                *at = (float)(noise * (x < 64 && y < 64 ? 2.0 : 1.0) +
+                              glow * 0.5 * fmax(x - 150.0, 0.0) * fmax(y - 125.0, 0.0));
+            }
+        }
+        bst_streak_finder *f = clean(s);
+        double m[2], usual[2];
+        moments(f, 16, 48, 16, 48, m);
+        moments(f, 70, 140, 0, SIDE, usual);
+        /* that of a cell is known to 8 %; the glow's steep slope counts as noise, so that there is
+         * little of it left in its corner, a seventh of the frame */
+        bst_assert_close(m[1] / usual[1], glow ? 1.0 : 2.0, 0.2);
+        bst_assert_close(usual[1], 1.0, glow ? 0.15 : 0.05);
+        for (int k = 0; k < 9; k++) {
+            /* the glow is 400 to 2300 there; its noise by the quartile of a slope some hundreds */
+            int x = 178 + 10 * (k % 3), y = 178 + 10 * (k / 3);
+            moments(f, x - 2, x + 3, y - 2, y + 3, m);
+            bst_assert_close(m[0], 0.0, glow ? 0.3 : 0.8);
+        }
+        bst_streak_finder_free(f);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(uneven_background),
@@ -259,6 +355,8 @@ int main(void) {
         cmocka_unit_test(places_are_in_frames_of_any_shape),
         cmocka_unit_test(nothing_to_find),
         cmocka_unit_test(ends_of_a_long_path),
+        cmocka_unit_test(levels_of_columns_and_rows),
+        cmocka_unit_test(glow_of_a_corner),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
