@@ -25,12 +25,17 @@
 #define EARTH_WISHED_DEG 5.0
 /* Least angle between a body and the corner of the field. */
 #define MARGIN_DEG 0.15
-/* Least height above the Earth at which the corner of the field and the target are seen past the
- * limb. Airglow ends there: the highest bright layer, O I 557.7 nm, is at 97 km (Khomich, Semenov
- * and Shefov, Airglow as an Indicator of Upper Atmospheric Structure and Dynamics, 2008). Air has
- * 5e-7 of its density on the ground (U.S. Standard Atmosphere 1976: 5.6e-7 and 1.2 kg/m3), and so
- * has the light that it scatters. The sky there is computed by the model of the frames. */
+/* Least height above the Earth at which the target is seen past the limb. Airglow ends there: the
+ * highest bright layer, O I 557.7 nm, is at 97 km (Khomich, Semenov and Shefov, Airglow as an
+ * Indicator of Upper Atmospheric Structure and Dynamics, 2008). Air has 5e-7 of its density on the
+ * ground (U.S. Standard Atmosphere 1976: 5.6e-7 and 1.2 kg/m3), and so has the light that it
+ * scatters. The sky there is computed by the model of the frames. */
 #define LIMB_CLEAR_M 100e3
+/* The same for the corner of the field. By that model the glow above the day side has V 10.5 per
+ * square arcsecond there (V 2.4 on the ground, 8 km of scale height): 8e4 e- in half a second, a
+ * pixel of 3 arcsec and an aperture of 0.15 m, within the full well. With 80 km the stars built
+ * into the program are too few for pair 40906, 46561 of tests/e2e/test_new.py. */
+#define CORNER_CLEAR_M 60e3
 /* Least number of catalogue stars in the field at any time of the run. In frames of smeared stars
  * image processing identifies about half of them; runs with 8 to 12 lost the attitude. */
 #define LEAST_STARS 14
@@ -74,7 +79,7 @@ static const char *const reason_words[REASONS] = {
 typedef struct look {
     reason why;
     double v_mag, range_m, rate_arcsec_per_s, limb_rad;
-    double limb_clear_rad; /* at which the line of sight is LIMB_CLEAR_M above the ground */
+    double corner_clear_rad; /* at which a line of sight is CORNER_CLEAR_M above the ground */
     double sky_mag_arcsec2;
     bst_vec3 direction;
 } look;
@@ -89,17 +94,18 @@ typedef struct search {
     bst_world *world;
     bst_world_view *view;
     bst_boresight_sky *sky;
+    int judged;                /* runs shown to the judge */
     int near_earth, few_stars; /* runs with the Earth in the field; without an attitude */
     double best_v_mag;         /* of what was too faint only */
 } search;
 
 /* ------------------------------------------------------------------ what is seen */
 
-/* Angle from the limb at which a line of sight passes LIMB_CLEAR_M above the Earth, a sphere. */
-static double limb_clear_rad(bst_vec3 eye_m) {
+/* Angle from the limb at which a line of sight passes so high above the Earth, a sphere. */
+static double limb_clear_rad(bst_vec3 eye_m, double height_m) {
     double r = bst_vec3_norm(eye_m);
     double to_limb_m = sqrt(fmax(r * r - BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M, 0.0));
-    return atan2(LIMB_CLEAR_M, to_limb_m);
+    return atan2(height_m, to_limb_m);
 }
 
 /* Brightness of the sky in a direction, V per square arcsecond. */
@@ -126,13 +132,14 @@ static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *o
         (look){.v_mag = now.v_mag,
                .range_m = now.range_m,
                .direction = now.geometric,
-               .limb_clear_rad = limb_clear_rad(eye.position_m),
+               .corner_clear_rad = limb_clear_rad(eye.position_m, CORNER_CLEAR_M),
                .sky_mag_arcsec2 = BST_NEW_SKY_MAG_ARCSEC2,
                .rate_arcsec_per_s = bst_vec3_angle(now.geometric, then.geometric) / BST_ARCSEC_RAD};
     out->limb_rad = bst_astro_earth_limb_angle(eye.position_m, bodies.pole, now.geometric);
     double sun = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.sun_m, eye.position_m));
     double moon = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.moon_m, eye.position_m));
-    double clear = fmax(EARTH_CLEAR_DEG * BST_DEG_RAD, out->limb_clear_rad);
+    double clear =
+        fmax(EARTH_CLEAR_DEG * BST_DEG_RAD, limb_clear_rad(eye.position_m, LIMB_CLEAR_M));
     out->why = now.occulted                                      ? BEHIND_EARTH
                : out->limb_rad < clear                           ? NEAR_EARTH
                : sun < SUN_CLEAR_DEG * BST_DEG_RAD               ? NEAR_SUN
@@ -148,7 +155,7 @@ static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *o
 /* How far from the limb the boresight is to be. */
 static double free_of_earth(const bst_new_scene *s) {
     return s->side_px * s->pixel_arcsec * BST_ARCSEC_RAD * sqrt(0.5) +
-           fmax(MARGIN_DEG * BST_DEG_RAD, s->limb_clear_rad);
+           fmax(MARGIN_DEG * BST_DEG_RAD, s->corner_clear_rad);
 }
 
 /* The widest field, of those that have the stars for an attitude, without the Earth in it. */
@@ -229,7 +236,7 @@ static bool scene_at(search *s, int i, bst_new_scene *out) {
         brightest = fmin(brightest, s->looks[k].v_mag);
         out->faintest_v_mag = fmax(out->faintest_v_mag, s->looks[k].v_mag);
         out->limb_rad = fmin(out->limb_rad, s->looks[k].limb_rad);
-        out->limb_clear_rad = fmax(out->limb_clear_rad, s->looks[k].limb_clear_rad);
+        out->corner_clear_rad = fmax(out->corner_clear_rad, s->looks[k].corner_clear_rad);
         out->sky_mag_arcsec2 = fmin(out->sky_mag_arcsec2, s->looks[k].sky_mag_arcsec2);
         out->range_m = fmin(out->range_m, s->looks[k].range_m);
         out->rate_arcsec_per_s = fmax(out->rate_arcsec_per_s, s->looks[k].rate_arcsec_per_s);
@@ -420,7 +427,7 @@ static bst_status choose_best(bst_ctx *ctx, search *s, bool few_stars, bst_new_j
                               void *user, bst_new_scene *out, bool *found, char why[256]) {
     const double *cost = few_stars ? s->starless_cost : s->cost;
     *found = false;
-    for (int judged = 0; judged < MOST_JUDGED && !*found;) {
+    while (s->judged < MOST_JUDGED && !*found) {
         int best = 0;
         bool enough = true;
         for (int i = 1; i < s->count; i++) {
@@ -440,7 +447,7 @@ static bst_status choose_best(bst_ctx *ctx, search *s, bool few_stars, bst_new_j
             s->few_stars++;
             continue;
         }
-        judged++;
+        s->judged++;
         BST_TRY(judge(user, ctx, out, found, why));
         if (!*found) {
             exclude(s, best, out->duration_s);

@@ -30,7 +30,7 @@ typedef struct bst_new_scene {
     bst_time epoch;
     double duration_s, period_s, exposure_s, pixel_arcsec;
     double limb_rad;          /* least angle from the Earth's limb */
-    double limb_clear_rad;    /* least such angle that the corner of the field may have */
+    double corner_clear_rad;  /* least such angle that the corner of the field may have */
     double sky_mag_arcsec2;   /* brightest sky at the target in the run */
     bool few_stars;           /* too few in the field for an attitude */
     int side_px;              /* of the square detector */
