@@ -86,6 +86,8 @@ typedef struct look {
 
 typedef struct search {
     const bst_new_request *request;
+    bst_new_judge judge;
+    void *user; /* of the judge */
     bst_time start;
     int count;
     look *looks;
@@ -423,8 +425,8 @@ static void exclude(search *s, int best, double duration_s) {
 
 /* The best run that the judge accepts, of those with the stars for an attitude or, with
  * `few_stars`, of the others whose target is slow. */
-static bst_status choose_best(bst_ctx *ctx, search *s, bool few_stars, bst_new_judge judge,
-                              void *user, bst_new_scene *out, bool *found, char why[256]) {
+static bst_status choose_best(bst_ctx *ctx, search *s, bool few_stars, bst_new_scene *out,
+                              bool *found, char why[256]) {
     const double *cost = few_stars ? s->starless_cost : s->cost;
     *found = false;
     while (s->judged < MOST_JUDGED && !*found) {
@@ -448,7 +450,7 @@ static bst_status choose_best(bst_ctx *ctx, search *s, bool few_stars, bst_new_j
             continue;
         }
         s->judged++;
-        BST_TRY(judge(user, ctx, out, found, why));
+        BST_TRY(s->judge(s->user, ctx, out, found, why));
         if (!*found) {
             exclude(s, best, out->duration_s);
         }
@@ -456,8 +458,7 @@ static bst_status choose_best(bst_ctx *ctx, search *s, bool few_stars, bst_new_j
     return BST_OK;
 }
 
-static bst_status choose(bst_ctx *ctx, search *s, bst_new_judge judge, void *user,
-                         bst_new_scene *out) {
+static bst_status choose(bst_ctx *ctx, search *s, bst_new_scene *out) {
     char why[256] = "";
     bool found = false;
     for (int i = 0; i < s->count; i++) {
@@ -465,13 +466,12 @@ static bst_status choose(bst_ctx *ctx, search *s, bst_new_judge judge, void *use
         s->starless_cost[i] = INFINITY;
     }
     for (int few_stars = 0; few_stars < 2 && !found; few_stars++) {
-        BST_TRY(choose_best(ctx, s, few_stars, judge, user, out, &found, why));
+        BST_TRY(choose_best(ctx, s, few_stars, out, &found, why));
     }
     return found ? BST_OK : nothing(ctx, s, why);
 }
 
-static bst_status find(bst_ctx *ctx, search *s, bst_new_judge judge, void *user,
-                       bst_new_scene *out) {
+static bst_status find(bst_ctx *ctx, search *s, bst_new_scene *out) {
     s->looks = calloc(LOOKS, sizeof *s->looks);
     s->cost = calloc(LOOKS, sizeof *s->cost);
     s->starless_cost = calloc(LOOKS, sizeof *s->starless_cost);
@@ -483,13 +483,13 @@ static bst_status find(bst_ctx *ctx, search *s, bst_new_judge judge, void *user,
     for (int i = 0; i < s->count; i++) {
         BST_TRY(look_at(ctx, s, LOOK_S * i, &s->looks[i]));
     }
-    return choose(ctx, s, judge, user, out);
+    return choose(ctx, s, out);
 }
 
 bst_status bst_new_scene_find(bst_ctx *ctx, const bst_new_request *request, bst_new_judge judge,
                               void *user, bst_new_scene *out) {
-    search s = {.request = request, .best_v_mag = INFINITY};
-    bst_status status = find(ctx, &s, judge, user, out);
+    search s = {.request = request, .judge = judge, .user = user, .best_v_mag = INFINITY};
+    bst_status status = find(ctx, &s, out);
     bst_boresight_sky_free(s.sky);
     bst_world_view_free(s.view);
     bst_world_free(s.world);
