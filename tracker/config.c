@@ -90,7 +90,8 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Standard deviation of the cue's rate beyond what the cue states."),
     BST_FORMER("target_rate_floor_arcsec_per_s", "target_rate_systematic_arcsec_per_s"),
     BST_REAL(C, target_max_rate_sigma_arcsec_per_s, "arcsec/s", 1e-6, 1e4, "0.8",
-             "A track is judged against the cue once its rate is known to this."),
+             "A track is judged against the cue once its rate is known to this, or while it "
+             "manoeuvres."),
     BST_REAL(C, target_dormant_s, "s", 0, 1e6, "600",
              "A lost target's extrapolated place binds the next choice for this long."),
     BST_FORMER("target_memory_s", "target_dormant_s"),

@@ -97,11 +97,18 @@ static bool rate_is_known(const bst_target_params *params, const bst_mtt_track *
     return s->covariance[2][2] <= limit2 && s->covariance[3][3] <= limit2;
 }
 
+/* True if the filter assumes that the track manoeuvres: its process noise then keeps the rate from
+ * becoming as well known, and the misfit counts that by the rate's covariance. */
+static bool manoeuvres(const bst_mtt_track *track) {
+    return track->manoeuvre_end_s > track->last_update_s;
+}
+
 bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
                                  const bst_mtt_track *track) {
     int dof = 2 * (track->hits - 2);
-    if (!cue->valid || track->at_rest || track->status == BST_TRACK_TENTATIVE ||
-        !rate_is_known(params, track) || (dof > 0 && track->chi2 > params->max_chi2 * dof)) {
+    bool known = rate_is_known(params, track) || manoeuvres(track);
+    if (!cue->valid || track->at_rest || track->status == BST_TRACK_TENTATIVE || !known ||
+        (dof > 0 && track->chi2 > params->max_chi2 * dof)) {
         return (bst_target_fit){.chi2 = INFINITY};
     }
     return misfit(params, cue, track);

@@ -133,11 +133,57 @@ static void the_earth(void **state) {
     spans_beside(BST_FIELD_EARTH, 40.0, 1.2, 4);
 }
 
+/* Sky at the boresight that fills the well. The day side has V 2.4 per square arcsecond (an albedo
+ * of 0.3: -26.74 - 2.5 log10(0.3 / pi) + 26.57), which the limb glow falls from by e every 8 km.
+ * Pixels of 3 arcsec behind 0.15 m of 0.7 x 0.7 fill 100,000 e- in 0.5 s up to 59 km of height
+ * where the Sun is overhead, not above that. */
+static void a_sky_that_fills_the_well(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scene s;
+    double radius, ra, dec;
+    open_scene(&s, 0, 0);
+    bst_vec3 d = body_at(&s, BST_FIELD_EARTH, 9000.0, &radius);
+    close_scene(&s);
+    bst_vec3 look =
+        bst_vec3_unit(bst_vec3_axpy(d, tan(40.0 * BST_DEG_RAD), bst_vec3_perpendicular(d)));
+    bst_vec3_to_radec(look, &ra, &dec);
+    open_scene(&s, ra / BST_DEG_RAD, dec / BST_DEG_RAD);
+    bst_check_body_span items[MOST];
+    bst_check_body_spans found = {.items = items, .capacity = MOST};
+    bst_assert_ok(&ctx, bst_check_bodies_in_field(&ctx, &s.scenario, s.world, 0, 0, &found));
+    int spans = 0;
+    for (int i = 0; i < found.count; i++) {
+        if (items[i].body != BST_FIELD_BRIGHT_SKY) {
+            continue;
+        }
+        spans++;
+        double highest = 0.0, lowest = INFINITY;
+        for (int end = 0; end < 2; end++) {
+            bst_world_state eye;
+            bst_assert_ok(&ctx,
+                          bst_world_view_observer_state(
+                              &ctx, s.view, 0, end ? items[i].until_s : items[i].from_s, &eye));
+            double down = bst_vec3_angle(look, bst_vec3_scale(eye.position_m, -1.0));
+            double height = bst_vec3_norm(eye.position_m) * sin(down) - 6371e3;
+            highest = fmax(highest, height);
+            lowest = fmin(lowest, height);
+        }
+        /* from the limb on; the Earth as a sphere errs by 15 km at the poles, the step of 10 s of
+         * 0.06 degrees each is bisected */
+        assert_true(fabs(lowest) < 20e3);
+        assert_true(highest > 20e3 && highest < 59e3 + 15e3);
+    }
+    assert_true(spans >= 1);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_moon),
         cmocka_unit_test(the_sun),
         cmocka_unit_test(the_earth),
+        cmocka_unit_test(a_sky_that_fills_the_well),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -99,9 +99,13 @@ static void test_snr(void **state) {
     /* By hand: 3.6e10 photons/s/m2 of V = 0, 0.15 m, 0.7 x 0.7, V 10, 0.5 s: 15586 e. In 4 pi
      * pixels of 3 arcsec, sky of V 22 per square arcsec gives 4.447 e/s each, dark 0.5 e/s, read
      * noise 5 e. Tolerance: rounding of the operands. */
-    bst_assert_close(bst_new_snr(0.15, 3.0, 10.0, 0.5), 123.48469228, 1e-7);
+    bst_assert_close(bst_new_snr(0.15, 3.0, 22.0, 10.0, 0.5), 123.48469228, 1e-7);
     /* shot noise of the source alone: SNR grows as the aperture */
-    bst_assert_close(bst_new_snr(2.0, 3.0, 2.0, 1.0) / bst_new_snr(1.0, 3.0, 2.0, 1.0), 2.0, 1e-4);
+    bst_assert_close(bst_new_snr(2.0, 3.0, 22.0, 2.0, 1.0) / bst_new_snr(1.0, 3.0, 22.0, 2.0, 1.0),
+                     2.0, 1e-4);
+    /* a sky 1000 times as bright: 4447 e/s in each of 4 pi pixels */
+    double noise2 = 15586.0 + 4.0 * BST_PI * (25.0 + 0.5 * (4447.0 + 0.5));
+    bst_assert_close(bst_new_snr(0.15, 3.0, 14.5, 10.0, 0.5), 15586.0 / sqrt(noise2), 0.01);
 }
 
 static void test_pixel_scale(void **state) {
@@ -128,17 +132,23 @@ static void test_period_and_exposure(void **state) {
         bst_new_scene s = {.period_s = period,
                            .pixel_arcsec = pixel,
                            .rate_arcsec_per_s = rate,
+                           .sky_mag_arcsec2 = 22.0,
                            .faintest_v_mag = 9.5};
         double exposure = bst_new_exposure_s(&q, &s, 9.0);
         assert_true(period == 0.1 || rate * period <= 24.0 * pixel);
         if (exposure > 0.0) {
             assert_true(exposure <= 0.5 * period * 1.1);
-            assert_true(bst_new_snr(0.15, pixel, 9.5, exposure) >= 12.0);
+            assert_true(bst_new_snr(0.15, pixel, 22.0, 9.5, exposure) >= 12.0);
         }
     }
     /* the faintest target needs the whole period, a fainter one has no exposure */
-    bst_new_scene s = {.period_s = 1.0, .pixel_arcsec = 3.0, .faintest_v_mag = 12.0};
+    bst_new_scene s = {
+        .period_s = 1.0, .pixel_arcsec = 3.0, .sky_mag_arcsec2 = 22.0, .faintest_v_mag = 12.0};
     assert_true(bst_new_exposure_s(&q, &s, 12.0) > 0.0);
+    /* not before a sky of V 12 per square arcsecond */
+    s.sky_mag_arcsec2 = 12.0;
+    assert_true(bst_new_exposure_s(&q, &s, 12.0) == 0.0);
+    s.sky_mag_arcsec2 = 22.0;
     /* what limits it: stars that move 6 px; half of a full well in the brightest pixel, a fifth of
      * the light of 1/4 pi d^2 of the pupil; half of the period; 5 ms at least. Rounded up to two
      * digits of whole milliseconds */
@@ -148,6 +158,7 @@ static void test_period_and_exposure(void **state) {
         const double v_mag = k == 1 ? 3.0 : 8.0;
         bst_new_scene limited = {.period_s = 1.6,
                                  .pixel_arcsec = 4.0,
+                                 .sky_mag_arcsec2 = 22.0,
                                  .rate_arcsec_per_s = k == 0   ? 130.0
                                                       : k == 3 ? 20000.0
                                                                : 1.0,
@@ -160,7 +171,7 @@ static void test_period_and_exposure(void **state) {
         assert_true(found >= wanted[k] - 1e-9 && found < wanted[k] + unit);
     }
     s.faintest_v_mag = 16.0;
-    assert_true(bst_new_snr(0.15, 3.0, 16.0, 0.5) < 12.0);
+    assert_true(bst_new_snr(0.15, 3.0, 22.0, 16.0, 0.5) < 12.0);
     assert_true(bst_new_exposure_s(&q, &s, 16.0) == 0.0);
 }
 
@@ -244,26 +255,32 @@ double __wrap_bst_astro_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst
                           : __real_bst_astro_earth_limb_angle(position_m, pole, direction);
 }
 
-/* A field is taken whose corner, half a diagonal away, is 0.15 degrees off the limb, and not one
- * whose corner is nearer. */
+/* A field is taken whose corner, half a diagonal away, is seen through more than 60 km above the
+ * limb, and not one whose corner is lower. Of the distance of the limb 2 %: the Earth's figure. */
 static void test_corners_keep_off_the_limb(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_new_request q = {.aperture_m = 0.15,
+                         .pixel_arcsec = 8.0,
                          .name = "search",
                          .observer_label = "eye",
                          .start = "2022-06-16T12:00:00Z"};
     bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "o", "39089", &q.observer));
     bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "t", "44801", &q.target));
+    bst_sgp4 *eye;
+    bst_assert_ok(
+        &ctx, bst_sgp4_create(&ctx, &q.observer.elements, BST_SGP4_WGS72, BST_SGP4_AFSPC, &eye));
     judged j[3] = {{.count = 0}};
     bst_new_scene none;
     double corner = 0.0;
     for (int k = 0; k < 3; k++) {
-        limb_rad = k == 0 ? 0.5 : corner * (k == 1 ? 1.001 : 0.999);
+        limb_rad = k == 0 ? 0.5 : corner * (k == 1 ? 1.02 : 0.98);
         assert_int_equal(bst_new_scene_find(&ctx, &q, refuse, &j[k], &none), BST_ERR_NOT_FOUND);
         assert_true(j[k].count > 0);
         const bst_new_scene *s = &j[0].scenes[0];
-        corner = s->side_px * s->pixel_arcsec * BST_ARCSEC_RAD / sqrt(2.0) + 0.15 * BST_DEG_RAD;
+        double r = bst_vec3_norm(place_of(eye, &q.observer.elements, s->epoch));
+        corner = s->side_px * s->pixel_arcsec * BST_ARCSEC_RAD / sqrt(2.0) +
+                 atan(60e3 / sqrt(r * r - 6371e3 * 6371e3));
     }
     limb_rad = 0.0;
     int same[3] = {0};
@@ -275,6 +292,40 @@ static void test_corners_keep_off_the_limb(void **state) {
     }
     assert_true(same[1] > 0);
     assert_int_equal(same[2], 0);
+    bst_sgp4_free(eye);
+}
+
+/* Two satellites of one shell see each other only near the limb: never through less than 100 km
+ * above the Earth, here a sphere of the equator's radius less 22 km of flattening, nor in front of
+ * a sky brighter than V 16 per square arcsecond, which the limb glow has there where the Sun is
+ * overhead (2.4 + 2.5 log10(e) 100 km / 8 km). */
+static void test_lines_of_sight_clear_the_limb(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_new_request q = {.aperture_m = 0.6, .name = "search", .observer_label = "eye"};
+    bst_sgp4 *eye, *target;
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "o", "46038", &q.observer));
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "t", "45701", &q.target));
+    bst_assert_ok(
+        &ctx, bst_sgp4_create(&ctx, &q.observer.elements, BST_SGP4_WGS72, BST_SGP4_AFSPC, &eye));
+    bst_assert_ok(
+        &ctx, bst_sgp4_create(&ctx, &q.target.elements, BST_SGP4_WGS72, BST_SGP4_AFSPC, &target));
+    judged j = {.count = 0};
+    bst_new_scene none;
+    assert_int_equal(bst_new_scene_find(&ctx, &q, refuse, &j, &none), BST_ERR_NOT_FOUND);
+    assert_true(j.count > 0);
+    for (int k = 0; k < j.count; k++) {
+        for (double t = 0.0; t <= j.scenes[k].duration_s; t += 20.0) {
+            bst_time at = bst_time_add(j.scenes[k].epoch, t);
+            bst_vec3 here = place_of(eye, &q.observer.elements, at),
+                     line = bst_vec3_sub(place_of(target, &q.target.elements, at), here);
+            double lowest = bst_vec3_norm(bst_vec3_cross(here, bst_vec3_unit(line)));
+            assert_true(lowest > 6378137.0 - 22e3 + 100e3);
+        }
+        assert_true(j.scenes[k].sky_mag_arcsec2 > 16.0 && j.scenes[k].sky_mag_arcsec2 < 22.1);
+    }
+    bst_sgp4_free(eye);
+    bst_sgp4_free(target);
 }
 
 /* The scenes found in two days: range, rate and angle from the limb over the run by SGP4 in TEME
@@ -343,6 +394,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_plain_names),
         cmocka_unit_test(test_corners_keep_off_the_limb),
+        cmocka_unit_test(test_lines_of_sight_clear_the_limb),
         cmocka_unit_test(test_scenes_are_as_seen),
         cmocka_unit_test(test_satellites_are_found),
         cmocka_unit_test(test_satellites_are_refused),

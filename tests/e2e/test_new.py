@@ -173,6 +173,15 @@ class New(unittest.TestCase):
         self.assertEqual(len(counts), 24)
         self.assertGreaterEqual(min(count for count, in counts), 12)
 
+    def test_few_stars_are_stated(self):
+        """No time of this slow pair has the stars for an attitude in a field free of the Earth."""
+        path = os.path.join(runs.scratch(), "pair.json")
+        made = call("new", path, "--observer-tle", "33595", "--target-tle", "47747")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertIn("too few stars in the field for an attitude", made.stdout)
+        with open(path, encoding="utf-8") as file:
+            self.assertIn("The field holds too few stars for an attitude", json.load(file)["description"])
+
     def test_element_sets_are_not_written_over(self):
         sets = os.path.join(runs.scratch(), "sets.tle")
         shutil.copy(SETS[0], sets)

@@ -302,6 +302,40 @@ static void manoeuvres_and_flares_are_reported(void **state) {
     }
 }
 
+/* The innovation that a reported burn explains does not count against the track: the event has the
+ * track with it, the track afterwards has 2 in its place, which is its mean. */
+static void a_burn_does_not_count_against_its_track(void **state) {
+    (void)state;
+    int compared = 0;
+    for (uint64_t seed = 0; seed < 20; seed++) {
+        bst_mtt_params params = defaults();
+        params.filter = BST_FILTER_EKF;
+        params.false_events_per_hour = 0.01;
+        bench *b = start(seed, &params);
+        bst_vec3 d = bst_vec3_from_radec(1.0, 0.2);
+        for (int k = 0; k < 45; k++) {
+            bst_vec3 place = along(d, 0.3, 20 * AS * k);
+            place = k > 30 ? along(place, 1.9, 0.5 * AS * (k - 30)) : place;
+            see(b, place, 13.0);
+            frame(b, k);
+            int n;
+            const bst_mtt_event *events = bst_mtt_events(b->mtt, &n);
+            const bst_mtt_track *track = track_at(b, place, 6 * AS);
+            for (int i = 0; i < n && track; i++) {
+                const bst_mtt_track *then = &events[i].track;
+                if (events[i].kind == BST_MTT_MANOEUVRE && then->id == track->id &&
+                    then->last_chi2 > 2.0) {
+                    /* rounding of sums below 1e3 */
+                    bst_assert_close(track->chi2, then->chi2 - then->last_chi2 + 2.0, 1e-9);
+                    compared++;
+                }
+            }
+        }
+        bst_mtt_free(b->mtt);
+    }
+    assert_true(compared >= 5);
+}
+
 /* Full speed ahead by 12 arcsec/s: the IMM keeps the object; one quiet model does, because a second
  * gate finds what has left the first one, or without events because the new track is the object's.
  */
@@ -486,6 +520,7 @@ int main(int argc, char **argv) {
 
                                        cmocka_unit_test(false_events_are_as_rare_as_asked),
                                        cmocka_unit_test(manoeuvres_and_flares_are_reported),
+                                       cmocka_unit_test(a_burn_does_not_count_against_its_track),
                                        cmocka_unit_test(filters_hold_through_a_burn),
                                        cmocka_unit_test(clutter_is_no_manoeuvre),
                                        cmocka_unit_test(five_hundred_tracks_by_each),

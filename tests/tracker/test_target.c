@@ -157,6 +157,21 @@ static void takes_the_likeliest(void **state) {
     assert_int_equal(choose(b, 2), 2);
 }
 
+/* While the filter assumes a manoeuvre its noise keeps the rate from becoming well known: such a
+ * track is compared by that rate. */
+static void takes_a_track_that_manoeuvres(void **state) {
+    (void)state;
+    for (int manoeuvre = 0; manoeuvre < 2; manoeuvre++) {
+        bst_mtt_track t = make_track(1, 100, 1.0, 13);
+        t.state.covariance[2][2] = t.state.covariance[3][3] = 1.6 * 1.6 * AS * AS;
+        t.last_update_s = 100.0;
+        t.manoeuvre_end_s = manoeuvre ? 160.0 : 99.0;
+        assert_int_equal(choose(&t, 1), manoeuvre);
+        t.state.rate_radps = bst_vec3_scale(t.state.rate_radps, 0.5); /* 25 arcsec/s off */
+        assert_int_equal(choose(&t, 1), 0);
+    }
+}
+
 static void takes_nothing_wrong(void **state) {
     (void)state;
     bst_mtt_track t = make_track(1, 0, 2.5, 13); /* wrong rate */
@@ -544,6 +559,7 @@ int main(void) {
                                        cmocka_unit_test(misfit_off_the_diagonal),
                                        cmocka_unit_test(released_by_the_covariance_of_its_rate),
                                        cmocka_unit_test(takes_the_likeliest),
+                                       cmocka_unit_test(takes_a_track_that_manoeuvres),
                                        cmocka_unit_test(takes_nothing_wrong),
                                        cmocka_unit_test(keeps_and_lets_go),
                                        cmocka_unit_test(expects_what_the_cue_says),

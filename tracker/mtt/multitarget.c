@@ -318,6 +318,9 @@ static void update_track(bst_mtt *m, int t) {
                bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
         record_event(m, BST_MTT_MANOEUVRE, track, statistic);
         track->manoeuvre_end_s = m->now.seconds + m->params.manoeuvre_sojourn_s;
+        /* the manoeuvre explains this innovation: it says nothing on whether the track is of one
+         * object */
+        track->chi2 -= fmax(chi2 - 2.0, 0.0);
     }
     if (!outshines && !merged) { /* otherwise the brightness contains another object's light */
         update_brightness(m, track, detection, dt);

@@ -6,9 +6,11 @@
 
 #include "control/control.h"
 #include "gimbal/ideal.h"
+#include "sim/analysis/check/boresight_sky.h"
 #include "sim/analysis/check/check_reach.h"
 #include "sim/analysis/check/check_spans.h"
 #include "sim/onboard/knowledge.h"
+#include "sim/world/scene/skylight.h"
 #include "sim/world/scene/stray.h"
 #include "sim/world/world_config.h"
 
@@ -17,7 +19,10 @@
 #define EDGE_S 0.1
 enum { MOST_SPANS = 1000 };
 
-static const char *const body_names[BST_FIELD_BODIES] = {"Earth", "Moon", "Sun"};
+static const char *const warnings[BST_FIELD_BODIES] = {
+    "the Earth is in the field", "the Moon is in the field", "the Sun is in the field",
+    "the sky at the boresight, brightened by the Earth's limb or stray light, exceeds the full "
+    "well in an exposure"};
 
 /* Known pointing of a sensor. */
 typedef enum gaze { GAZE_UNKNOWN, GAZE_CUE, GAZE_STARE, GAZE_IDEAL } gaze;
@@ -33,6 +38,8 @@ typedef struct looking {
     bst_world_view *view;
     const bst_world *world;
     double half_rad; /* from the boresight to the most distant corner */
+    double exposure_s;
+    bst_boresight_sky *sky; /* NULL: the background is uniform and constant */
 } looking;
 
 /* Checks whether a module changes the sensors' targets during a run. */
@@ -97,7 +104,8 @@ static bst_status boresight_at(bst_ctx *ctx, looking *l, double seconds, bool *k
                                           known, direction);
 }
 
-/* Angles between the edge of the field and each body, rad. */
+/* Angles between the edge of the field and each body, rad; for the sky, the share of the full well
+ * that it leaves free. */
 static bst_status clearances(bst_ctx *ctx, looking *l, double seconds,
                              double clear[BST_FIELD_BODIES]) {
     bool known;
@@ -121,6 +129,12 @@ static bst_status clearances(bst_ctx *ctx, looking *l, double seconds,
         bst_vec3_angle(d, moon) - asin(BST_MOON_RADIUS_M / bst_vec3_norm(moon)) - l->half_rad;
     clear[BST_FIELD_SUN] =
         bst_vec3_angle(d, sun) - asin(BST_SUN_RADIUS_M / bst_vec3_norm(sun)) - l->half_rad;
+    if (l->sky && limb > 0.0) {
+        double sky_e,
+            full_e = bst_camera_full_e(bst_world_camera(l->world, l->observer, l->sensor));
+        BST_TRY(bst_boresight_sky_at(ctx, l->sky, seconds, d, l->exposure_s, &sky_e));
+        clear[BST_FIELD_BRIGHT_SKY] = 1.0 - sky_e / full_e;
+    }
     return BST_OK;
 }
 
@@ -192,7 +206,14 @@ static bst_status look_ahead(bst_ctx *ctx, const bst_scenario *scenario, looking
         }
         BST_TRY(bst_knowledge_view_create(ctx, l->knowledge, &l->cue));
     }
-    l->half_rad = bst_camera_half_diagonal_rad(bst_world_camera(l->world, l->observer, l->sensor));
+    const bst_camera *camera = bst_world_camera(l->world, l->observer, l->sensor);
+    const bst_observer_config *observers = scenario->observers.items;
+    const bst_sensor_config *sensors = observers[l->observer].sensors.items;
+    l->half_rad = bst_camera_half_diagonal_rad(camera);
+    l->exposure_s = sensors[l->sensor].exposure.exposure_s;
+    if (bst_skylight_may_vary(camera) && l->exposure_s > 0.0) {
+        BST_TRY(bst_boresight_sky_create(ctx, l->world, l->view, l->observer, l->sensor, &l->sky));
+    }
     return spans_of(ctx, l, fmin(scenario->duration_s, BST_CHECK_LOOKED_S), out);
 }
 
@@ -202,6 +223,7 @@ bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
     looking l = {.observer = observer, .sensor = sensor, .world = world};
     out->count = 0;
     bst_status status = look_ahead(ctx, scenario, &l, out);
+    bst_boresight_sky_free(l.sky);
     bst_knowledge_view_free(l.cue);
     bst_knowledge_free(l.knowledge);
     bst_world_view_free(l.view);
@@ -219,8 +241,7 @@ static void warn_of_body(bst_ctx *ctx, const char *name, int body, const bst_che
     if (met.count > 0) {
         bst_check_span_words words =
             bst_check_spans_word(&met, fmin(duration_s, BST_CHECK_LOOKED_S), duration_s);
-        bst_log(ctx, BST_LOG_WARNING, "%s: the %s is in the field %s%s", name, body_names[body],
-                words.from, words.more);
+        bst_log(ctx, BST_LOG_WARNING, "%s: %s %s%s", name, warnings[body], words.from, words.more);
     }
 }
 

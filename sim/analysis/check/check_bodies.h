@@ -1,4 +1,5 @@
-/* Predicts when Earth, Moon or Sun are in a sensor's field, without a simulation. */
+/* Predicts when Earth, Moon or Sun are in a sensor's field, and when the sky at its boresight is
+ * too bright, without a simulation. */
 #ifndef BST_ANALYSIS_CHECK_CHECK_BODIES_H
 #define BST_ANALYSIS_CHECK_CHECK_BODIES_H
 
@@ -9,10 +10,13 @@ typedef enum bst_check_field_body {
     BST_FIELD_EARTH,
     BST_FIELD_MOON,
     BST_FIELD_SUN,
+    BST_FIELD_BRIGHT_SKY, /* no body: the sky at the boresight fills the well of a pixel, and the
+                             boresight is off the Earth's disc */
     BST_FIELD_BODIES
 } bst_check_field_body;
 
-/* A time span in which a body's disc overlaps the circle around the sensor. */
+/* A time span in which a body's disc overlaps the circle around the sensor, or the sky is too
+ * bright. */
 typedef struct bst_check_body_span {
     bst_check_field_body body;
     double from_s, until_s; /* after the epoch, to 0.1 s; until_s: at most the duration, or
@@ -39,8 +43,8 @@ bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
                                      const bst_world *world, int observer, int sensor,
                                      bst_check_body_spans *out) BST_MUST_CHECK;
 
-/* Logs a warning for each body that enters a sensor's field: first time span, number and total
- * duration. */
+/* Logs a warning for each body that enters a sensor's field, and of a sky at the boresight that
+ * exceeds the full well in an exposure: first time span, number and total duration. */
 bst_status bst_check_bodies(bst_ctx *ctx, const bst_scenario *scenario,
                             const bst_simulation *simulation) BST_MUST_CHECK;
 

@@ -345,8 +345,10 @@ static const rule rules[] = {
      "times at which the cue is out of reach: Earth, keep-out cones, travel, limits, "
      "keyhole; slews, steps of a search and scans that the mount's limits do not allow",
      NULL, NULL, bst_check_reach},
-    {"bodies", "times at which the Earth, the Moon or the Sun lies in the field", NULL, NULL,
-     bst_check_bodies},
+    {"bodies",
+     "times at which the Earth, the Moon or the Sun lies in the field, or the sky at the boresight "
+     "exceeds the full well",
+     NULL, NULL, bst_check_bodies},
 };
 
 static bst_status apply_to_sensors(bst_ctx *ctx, const rule *r, const bst_scenario *scenario,

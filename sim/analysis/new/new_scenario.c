@@ -131,10 +131,13 @@ bst_status bst_new_scenario_make(bst_ctx *ctx, const bst_new_order *w, const bst
     printf(
         "%s: %s looks at %s from %s for %g s\n"
         "  V %.1f, %.0f km away or more, at up to %.3g arcsec/s\n"
-        "  frames of %g s every %g s, pixels of %.3g arcsec\n"
+        "  frames of %g s every %g s, pixels of %.3g arcsec\n%s"
         "Run it:\n  boresight run %s --out runs/%s\n",
         out, q->observer.name, q->target.name, utc, scene.duration_s, scene.v_mag,
         1e-3 * scene.range_m, scene.rate_arcsec_per_s, scene.exposure_s, scene.period_s,
-        scene.pixel_arcsec, out, name);
+        scene.pixel_arcsec,
+        scene.few_stars ? "  too few stars in the field for an attitude: attitude telemetry alone\n"
+                        : "",
+        out, name);
     return BST_OK;
 }

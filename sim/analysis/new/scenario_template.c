@@ -27,8 +27,12 @@ static void put_head(FILE *f, const bst_new_request *q, const bst_new_scene *s) 
     snprintf(text, sizeof text,
              "%s follows %s: %.0f km away or more, at up to %.3g arcsec/s among the stars, V %.1f. "
              "The epoch is a time at which it is in sunlight and clear of Earth, Moon and Sun for "
-             "all of the run.",
-             q->observer.name, q->target.name, 1e-3 * s->range_m, s->rate_arcsec_per_s, s->v_mag);
+             "all of the run.%s",
+             q->observer.name, q->target.name, 1e-3 * s->range_m, s->rate_arcsec_per_s, s->v_mag,
+             s->few_stars
+                 ? " The field holds too few stars for an attitude: the target is followed "
+                   "with the attitude telemetry alone."
+                 : "");
     put_text(f, "    \"description\": ", text, ",\n");
     fprintf(f,
             "    \"epoch_utc\": \"%s\",\n    \"duration_s\": %.6g,\n    \"tick_rate_hz\": 6000,\n"

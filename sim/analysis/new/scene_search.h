@@ -30,9 +30,13 @@ typedef struct bst_new_scene {
     bst_time epoch;
     double duration_s, period_s, exposure_s, pixel_arcsec;
     double limb_rad;          /* least angle from the Earth's limb */
+    double corner_clear_rad;  /* least such angle that the corner of the field may have */
+    double sky_mag_arcsec2;   /* brightest sky at the target in the run */
+    bool few_stars;           /* too few in the field for an attitude */
     int side_px;              /* of the square detector */
     double v_mag;             /* at the epoch */
     double faintest_v_mag;    /* in the run */
+    double brightest_v_mag;   /* the same */
     double range_m;           /* least */
     double rate_arcsec_per_s; /* greatest, of the line of sight among the stars */
 } bst_new_scene;
@@ -42,7 +46,8 @@ typedef bst_status (*bst_new_judge)(void *user, bst_ctx *ctx, const bst_new_scen
                                     bool *holds, char why[256]);
 
 /* Finds a time at which the target is sunlit, bright enough and clear of Earth, Moon and Sun for
- * the whole run, and slow.
+ * the whole run, and slow, with the stars for an attitude in the field. Only if there is none, a
+ * time of few stars is taken for a target that the attitude telemetry alone can follow.
  *
  * Given:     request
  *            judge    called with `user` for the best times, in order, until it accepts one

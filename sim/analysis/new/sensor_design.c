@@ -17,10 +17,11 @@ static double signal_e_per_s(double aperture_m, double v_mag) {
            BST_NEW_QUANTUM_EFFICIENCY * pow(10.0, -0.4 * v_mag);
 }
 
-double bst_new_snr(double aperture_m, double pixel_arcsec, double v_mag, double exposure_s) {
+double bst_new_snr(double aperture_m, double pixel_arcsec, double sky_mag, double v_mag,
+                   double exposure_s) {
     double pixels = BST_PI * BST_NEW_FWHM_PX * BST_NEW_FWHM_PX;
     double s = signal_e_per_s(aperture_m, v_mag) * exposure_s;
-    double sky = signal_e_per_s(aperture_m, BST_NEW_SKY_MAG_ARCSEC2) * pixel_arcsec * pixel_arcsec;
+    double sky = signal_e_per_s(aperture_m, sky_mag) * pixel_arcsec * pixel_arcsec;
     double noise2 = pixels * (BST_NEW_READ_NOISE_E * BST_NEW_READ_NOISE_E +
                               (sky + BST_NEW_DARK_E_PER_S) * exposure_s);
     return s / sqrt(s + noise2);
@@ -60,8 +61,8 @@ double bst_new_exposure_s(const bst_new_request *q, const bst_new_scene *s, doub
         fmin(wanted, 0.5 * BST_NEW_FULL_WELL_E / peak / signal_e_per_s(q->aperture_m, brightest));
     wanted = fmin(fmax(wanted, LEAST_EXPOSURE_S), most);
     double longest = q->period_s > 0.0 ? fmin(MOST_EXPOSURE_S, 0.8 * s->period_s) : most;
-    while (bst_new_snr(q->aperture_m, s->pixel_arcsec, s->faintest_v_mag, wanted) <
-           BST_NEW_LEAST_SNR) {
+    while (bst_new_snr(q->aperture_m, s->pixel_arcsec, s->sky_mag_arcsec2, s->faintest_v_mag,
+                       wanted) < BST_NEW_LEAST_SNR) {
         if (wanted >= longest) {
             return 0.0;
         }

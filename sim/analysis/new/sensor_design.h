@@ -11,7 +11,8 @@
 /* Pixel scales at which a field of V < 9 has enough stars: slow and fast targets. */
 #define BST_NEW_FEW_STARS_ARCSEC 8.0
 #define BST_NEW_FEW_STARS_FAST_ARCSEC 10.0
-/* Slower targets are followed with the attitude telemetry alone, without stars. */
+/* Slower targets can be followed with the attitude telemetry alone, if no time with stars is found.
+ */
 #define BST_NEW_STARLESS_RATE_ARCSEC_PER_S 60.0
 /* Least SNR of the target in a frame. */
 #define BST_NEW_LEAST_SNR 12.0
@@ -21,10 +22,12 @@
  *
  * Given:     aperture_m    diameter of the telescope
  *            pixel_arcsec  pixel scale
+ *            sky_mag       of the sky, V per square arcsecond
  *            v_mag         of the source
  *            exposure_s
  * Reference: Janesick, Photon Transfer, 2007: shot noise of source, sky and dark, and read noise */
-double bst_new_snr(double aperture_m, double pixel_arcsec, double v_mag, double exposure_s);
+double bst_new_snr(double aperture_m, double pixel_arcsec, double sky_mag, double v_mag,
+                   double exposure_s);
 
 /* Pixel scale in arcsec: the request's if it gives one, else by rate and stars.
  *
@@ -41,7 +44,7 @@ double bst_new_period_s(const bst_new_request *request, double rate_arcsec_per_s
 /* Exposure in s at which the faintest target of the run has BST_NEW_LEAST_SNR, rounded up to two
  * digits.
  *
- * Given:     scene            period, pixel scale, rate and faintest_v_mag
+ * Given:     scene            period, pixel scale, rate, sky_mag_arcsec2 and faintest_v_mag
  *            brightest_v_mag  of the run: its peak stays below half of the full well if possible
  * Returned:  0 if no exposure that fits into the period is long enough */
 double bst_new_exposure_s(const bst_new_request *request, const bst_new_scene *scene,
