@@ -1,6 +1,5 @@
 #include "sim/analysis/check/boresight_sky.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 #include "sim/world/scene/skylight.h"
@@ -9,7 +8,8 @@
 #define STAR_LIMIT_V_MAG 15.0
 
 struct bst_boresight_sky {
-    const bst_camera *camera;
+    bst_camera camera; /* of the pixel at the boresight: edges of discs are looked for on all of a
+                          sensor, which takes milliseconds on a large one */
     bst_world_view *view;
     int observer;
     bst_skylight *light;
@@ -22,10 +22,12 @@ bst_status bst_boresight_sky_create(bst_ctx *ctx, const bst_world *world, bst_wo
     if (!sky) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the sky at the boresight");
     }
-    sky->camera = bst_world_camera(world, observer, sensor);
+    sky->camera = *bst_world_camera(world, observer, sensor);
+    sky->camera.width_px = sky->camera.height_px = 1;
+    sky->camera.boresight_offset_px[0] = sky->camera.boresight_offset_px[1] = 0.0;
     sky->view = view;
     sky->observer = observer;
-    bst_status status = bst_skylight_create(ctx, world, sky->camera, &sky->light);
+    bst_status status = bst_skylight_create(ctx, world, &sky->camera, &sky->light);
     if (status != BST_OK) {
         free(sky);
         return status;
@@ -41,15 +43,8 @@ void bst_boresight_sky_free(bst_boresight_sky *sky) {
     }
 }
 
-/* The sensor's pixel that is nearest to the boresight, on one axis. */
-static int pixel_at(int64_t size_px, double offset_px) {
-    double place = floor(0.5 * (double)(size_px - 1) + offset_px + 0.5);
-    return (int)fmin(fmax(place, 0.0), (double)(size_px - 1));
-}
-
 bst_status bst_boresight_sky_at(bst_ctx *ctx, bst_boresight_sky *sky, double seconds,
                                 bst_vec3 direction, double exposure_s, double *e) {
-    const bst_camera *c = sky->camera;
     bst_world_state eye;
     bst_bodies bodies;
     bst_astro_earth_frames frames;
@@ -71,12 +66,9 @@ bst_status bst_boresight_sky_at(bst_ctx *ctx, bst_boresight_sky *sky, double sec
     for (int k = 0; k <= BST_DISC_PARTS; k++) {
         around.q[k] = q;
     }
-    const bst_window pixel = {.x0 = pixel_at(c->width_px, c->boresight_offset_px[0]),
-                              .y0 = pixel_at(c->height_px, c->boresight_offset_px[1]),
-                              .width = 1,
-                              .height = 1};
+    const bst_window pixel = {.width = 1, .height = 1};
     const bst_skylight_map *map;
     BST_TRY(bst_skylight_make(ctx, sky->light, &around, pixel, &map));
-    *e = bst_skylight_at(map, pixel.x0, pixel.y0);
+    *e = bst_skylight_at(map, 0, 0);
     return BST_OK;
 }
