@@ -62,11 +62,6 @@ static bool residuals(const bst_custody_orbit *o, const double x[N], const measu
     return true;
 }
 
-/* Standard deviation of the photocentre in a direction, rad. */
-static double photocentre_rad(const bst_custody_orbit *o, double factor, double range_m) {
-    return bst_od_photocentre_rad(o->photocentre_m, factor, range_m);
-}
-
 /* Correlation of the photocentre's displacement at two directions of a pass. */
 static double photocentre_correlation(const bst_custody_orbit *o, const bst_od_observation *a,
                                       const bst_od_observation *b) {
@@ -80,7 +75,8 @@ static double photocentre_correlation(const bst_custody_orbit *o, const bst_od_o
 static void noise(const bst_custody_orbit *o, const measurement *z,
                   const double range_m[BST_CUSTODY_DIRECTIONS], double r[M][M]) {
     if (z->track) {
-        const double spread = photocentre_rad(o, z->track->photocentre_factor, range_m[0]);
+        const double spread =
+            bst_od_photocentre_rad(o->photocentre_m, z->track->photocentre_factor, range_m[0]);
         for (int i = 0; i < 4; i++) {
             memcpy(r[i], z->track->covariance[i], sizeof z->track->covariance[i]);
         }
@@ -97,9 +93,10 @@ static void noise(const bst_custody_orbit *o, const measurement *z,
             const bst_od_observation *b = &z->directions[k];
             const bst_tangent other = bst_tangent_at(b->direction);
             const bst_vec3 eb[2] = {other.e1, other.e2};
-            const double spread2 = photocentre_rad(o, a->photocentre_factor, range_m[i]) *
-                                   photocentre_rad(o, b->photocentre_factor, range_m[k]) *
-                                   photocentre_correlation(o, a, b);
+            const double spread2 =
+                bst_od_photocentre_rad(o->photocentre_m, a->photocentre_factor, range_m[i]) *
+                bst_od_photocentre_rad(o->photocentre_m, b->photocentre_factor, range_m[k]) *
+                photocentre_correlation(o, a, b);
             const double own[2][2] = {{a->cov_11, a->cov_12}, {a->cov_12, a->cov_22}};
             kept *= k > i ? exp(-b->shared_change) : 1.0;
             for (int p = 0; p < 2; p++) {
