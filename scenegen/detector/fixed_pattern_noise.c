@@ -90,21 +90,34 @@ typedef struct map_job {
 /* Rows in a part of a parallel loop. */
 enum { ROWS = 16 };
 
+/* Number of pixels of a row from x on that are drawn in one block. */
+static int block_pixels(int width, int x) {
+    return width - x < BST_RNG_BLOCK ? width - x : BST_RNG_BLOCK;
+}
+
 static void gain_rows(void *user, int begin, int end) {
     const map_job *job = user;
     const bst_detector_config *d = &job->camera->detector;
     const int width = (int)job->camera->width_px;
+    double z[BST_RNG_BLOCK] = {0}, u[BST_RNG_BLOCK];
     for (int y = begin; y < end; y++) {
-        float *row = job->map + (size_t)y * (size_t)job->stride;
-        for (int x = 0; x < width; x++) {
+        for (int x = 0; x < width; x += BST_RNG_BLOCK) {
+            float *row = job->map + (size_t)y * (size_t)job->stride + x;
             uint64_t pixel = (uint64_t)y * (uint64_t)width + (uint64_t)x;
+            const int pixels = block_pixels(width, x);
             if (!d->prnu_map[0]) {
-                double z = d->prnu_rms > 0.0 ? bst_rng_normal(job->key, DRAW_GAIN, pixel) : 0.0;
-                row[x] = (float)fmax(1.0 + d->prnu_rms * z, 0.0);
+                if (d->prnu_rms > 0.0) {
+                    bst_rng_normal_draws(job->key, DRAW_GAIN, pixel, z);
+                }
+                for (int i = 0; i < pixels; i++) {
+                    row[i] = (float)fmax(1.0 + d->prnu_rms * z[i], 0.0);
+                }
             }
-            if (d->dead_fraction > 0.0 &&
-                bst_rng_uniform(job->key, DRAW_DEAD, pixel) < d->dead_fraction) {
-                row[x] = 0.0f;
+            if (d->dead_fraction > 0.0) {
+                bst_rng_uniform_draws(job->key, DRAW_DEAD, pixel, u);
+                for (int i = 0; i < pixels; i++) {
+                    row[i] = u[i] < d->dead_fraction ? 0.0f : row[i];
+                }
             }
         }
     }
@@ -139,18 +152,29 @@ static void dark_rows(void *user, int begin, int end) {
     const double warm = bst_detector_dark_factor(d), mean = bst_camera_dark_e_per_s(job->camera);
     /* log-normal distribution of mean 1 */
     const double s2 = log1p(d->dsnu_rms * d->dsnu_rms), s = sqrt(s2);
+    double z[BST_RNG_BLOCK] = {0}, u[BST_RNG_BLOCK];
     for (int y = begin; y < end; y++) {
-        float *row = job->map + (size_t)y * (size_t)job->stride;
-        for (int x = 0; x < width; x++) {
+        for (int x = 0; x < width; x += BST_RNG_BLOCK) {
+            float *row = job->map + (size_t)y * (size_t)job->stride + x;
             uint64_t pixel = (uint64_t)y * (uint64_t)width + (uint64_t)x;
+            const int pixels = block_pixels(width, x);
             if (!d->dark_map[0]) {
-                double z = s > 0.0 ? bst_rng_normal(job->key, DRAW_DARK, pixel) : 0.0;
-                row[x] = (float)(mean * exp(s * z - 0.5 * s2));
+                if (s > 0.0) {
+                    bst_rng_normal_draws(job->key, DRAW_DARK, pixel, z);
+                }
+                for (int i = 0; i < pixels; i++) {
+                    row[i] = (float)(mean * exp(s * z[i] - 0.5 * s2));
+                }
             }
-            if (d->hot_fraction > 0.0 &&
-                bst_rng_uniform(job->key, DRAW_HOT, pixel) < d->hot_fraction) {
-                double dex = d->hot_spread_dex * bst_rng_normal(job->key, DRAW_HOT_RATE, pixel);
-                row[x] += (float)(warm * d->hot_median_e_per_s * pow(10.0, dex));
+            if (d->hot_fraction > 0.0) {
+                bst_rng_uniform_draws(job->key, DRAW_HOT, pixel, u);
+            }
+            for (int i = 0; d->hot_fraction > 0.0 && i < pixels; i++) {
+                if (u[i] < d->hot_fraction) {
+                    double dex = d->hot_spread_dex *
+                                 bst_rng_normal(job->key, DRAW_HOT_RATE, pixel + (uint64_t)i);
+                    row[i] += (float)(warm * d->hot_median_e_per_s * pow(10.0, dex));
+                }
             }
         }
     }

@@ -81,8 +81,14 @@ static void normal_blocks_are_single_draws(void **state) {
         for (size_t f = 0; f < sizeof firsts / sizeof *firsts; f++) {
             double block[2][BST_RNG_BLOCK];
             bst_rng_normal_block(key, firsts[f], block);
+            double normal[BST_RNG_BLOCK], uniform[BST_RNG_BLOCK];
+            uint64_t a = seed % 2 ? seed : seed << 33, b = firsts[f];
+            bst_rng_normal_draws(key, a, b, normal);
+            bst_rng_uniform_draws(key, a, b, uniform);
             for (int i = 0; i < BST_RNG_BLOCK; i++) {
-                double one[2];
+                double one[2], draw = bst_rng_normal(key, a, b + (uint64_t)i);
+                bst_assert_close(normal[i], draw, 2e-15 * (1.0 + fabs(draw)));
+                assert_true(uniform[i] == bst_rng_uniform(key, a, b + (uint64_t)i));
                 bst_rng_normal2(key, firsts[f] + (uint64_t)i, 0, one);
                 bst_assert_close(block[0][i], one[0], 2e-15 * (1.0 + fabs(one[0])));
                 bst_assert_close(block[1][i], one[1], 2e-15 * (1.0 + fabs(one[1])));
