@@ -151,7 +151,7 @@ void bst_sim_observe(bst_sim *sim, const bst_sim_observer *observer);
 /* Steps everything that is due before a time.
  *
  * Given:     until_s  seconds since the scenario's epoch; nothing is done if this time has been
- *                     reached
+ *                     reached; the scenario's duration is no limit
  * Errors:    those of modules and of the observer; BST_ERR_INTERRUPTED; BST_ERR_ARGUMENT if until_s
  *            is not finite or beyond 9e15 ticks; BST_ERR_STATE after a failed step
  * Notes:     until_s is rounded up to a tick. */

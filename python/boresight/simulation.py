@@ -159,7 +159,10 @@ class Simulation(ChannelViews):
     # ---- stepping
 
     def run_until(self, until_s: float) -> None:
-        """Steps everything that is due before a time, seconds since the scenario's epoch."""
+        """Steps everything that is due before a time, seconds since the scenario's epoch.
+
+        Nothing is done if this time has been reached. The scenario's duration is no limit.
+        """
         until = number_argument(until_s, "until_s")
         with self._guard.use() as sim:
             forget_raised(sim)

@@ -126,8 +126,8 @@ void bst_sim_observe(bst_sim *sim, const bst_sim_observer *observer) {
 static bst_status tick_of(bst_ctx *ctx, const bst_sim *sim, double seconds, int64_t *out) {
     double rate = (double)sim->model->scenario.tick_rate_hz, ticks = seconds * rate;
     if (!(fabs(ticks) < 9e15)) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "cannot run until %g s: allowed is up to %g s",
-                        seconds, 9e15 / rate);
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "cannot run until %g s: allowed is from %g to %g s",
+                        seconds, -9e15 / rate, 9e15 / rate);
     }
     /* tolerance for a time rounded to just above its tick */
     *out = (int64_t)ceil(ticks - 1e-6);

@@ -33,6 +33,10 @@ static double recorded_s(const bst_run_reader *run, const bst_scenario *scenario
 /* ------------------------------------------------------------------ orbits */
 
 enum { MOST_BREAKS = 4096, MOST_KEPT_ROWS = 65536 };
+/* Least number of rows of a piece: those that interpolation of an OEM takes. */
+enum { LEAST_ROWS = 10 };
+/* Least time between an end of a piece and a time of the grid, in steps of the grid. */
+static const double LEAST_INTERVAL = 0.1;
 
 /* An orbit between two burns, sampled at a grid of times. */
 typedef struct track {
@@ -43,10 +47,12 @@ typedef struct track {
     double step_s, span_s;
     double breaks[MOST_BREAKS + 2]; /* 0, starts and ends of burns, end of the run */
     int break_count;
-    double from_s, to_s;   /* of the piece */
-    int64_t inner;         /* first grid row after from_s */
-    int64_t first;         /* first row of a series within the piece */
-    bst_world_state *kept; /* cached first rows of the piece, up to MOST_KEPT_ROWS; NULL: none */
+    double from_s, to_s;     /* of the piece */
+    double origin_s, grid_s; /* of the grid; grid_s: step_s, or less in a short piece */
+    int64_t rows;            /* of the piece */
+    int64_t inner;           /* number of the grid's step at the second row */
+    int64_t first;           /* first row of a series within the piece */
+    bst_world_state *kept;   /* cached first rows of the piece, up to MOST_KEPT_ROWS; NULL: none */
 } track;
 
 static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_world_state *out) {
@@ -58,15 +64,25 @@ static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_wor
                             : bst_world_view_object_state(ctx, t->view, t->object, seconds, out);
 }
 
-/* Number of rows of a piece: its ends, and step, 2 step ... between them. */
-static int64_t rows_of(track *t) {
-    t->inner = (int64_t)floor(t->from_s / t->step_s + 1e-9) + 1;
-    int64_t last = (int64_t)ceil(t->to_s / t->step_s - 1e-9) - 1;
-    return 2 + (last >= t->inner ? last - t->inner + 1 : 0);
+/* Begins a piece and returns its number of rows: its ends, and times of the grid between them,
+ * which are multiples of the step, or equal parts of a short piece. None is next to an end: what 1
+ * ns and 1 um round would grow with the ratio of the intervals. */
+static int64_t begin_piece(track *t, double from_s, double to_s) {
+    const double part_s = (to_s - from_s) / (LEAST_ROWS - 1);
+    t->from_s = from_s;
+    t->to_s = to_s;
+    t->grid_s = fmin(t->step_s, part_s);
+    t->origin_s = t->step_s > part_s ? from_s : 0.0;
+    t->inner = (int64_t)ceil((from_s - t->origin_s) / t->grid_s + LEAST_INTERVAL);
+    int64_t last = (int64_t)floor((to_s - t->origin_s) / t->grid_s - LEAST_INTERVAL);
+    t->rows = 2 + (last >= t->inner ? last - t->inner + 1 : 0);
+    return t->rows;
 }
 
 static double seconds_of(const track *t, int64_t row) {
-    return row == 0 ? t->from_s : fmin((double)(t->inner + row - 1) * t->step_s, t->to_s);
+    return row == 0             ? t->from_s
+           : row == t->rows - 1 ? t->to_s
+                                : t->origin_s + (double)(t->inner + row - 1) * t->grid_s;
 }
 
 /* State of a row; at the end of a piece, the state before a burn. */
@@ -181,36 +197,53 @@ static bst_status write_piece(bst_ctx *ctx, const bst_export *e, FILE *stream, t
     return bst_oem_write_segment(ctx, stream, &segment);
 }
 
-/* Writes one orbit in pieces: at burns, and where it does not exist (decay, end of a file). */
+/* First row from `row` on without a state; those before it are kept. */
+static int64_t rows_end(track *t, bst_ctx *ctx, int64_t row, int64_t rows) {
+    bst_world_state state;
+    while (row < rows && row_state(t, ctx, seconds_of(t, row), &state) == BST_OK) {
+        if (t->kept && row < MOST_KEPT_ROWS) {
+            t->kept[row] = state;
+        }
+        row++;
+    }
+    return row;
+}
+
+/* Writes an orbit between two times at which it may change, in pieces where it does not exist
+ * (decay, end of a file). A piece of few rows is written on a finer grid. why: the first reason for
+ * which there is no state, "": none. */
+static bst_status write_between(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t,
+                                double from_s, double to_s, int *pieces, char *why) {
+    int64_t rows = begin_piece(t, from_s, to_s);
+    for (int64_t row = 0; row < rows;) {
+        int64_t end = rows_end(t, ctx, row, rows), count = end - row;
+        if (end < rows && !*why) {
+            snprintf(why, sizeof ctx->message, "%s", ctx->message);
+        }
+        t->first = row;
+        if (count > 1 && count < LEAST_ROWS && count < rows) {
+            t->first = 0;
+            count = begin_piece(t, seconds_of(t, row), seconds_of(t, end - 1));
+            count = rows_end(t, ctx, 0, count);
+        }
+        if (count > 0) {
+            BST_TRY(write_piece(ctx, e, stream, t, count, ++*pieces));
+        }
+        rows = begin_piece(t, from_s, to_s);
+        row = end > row ? end : row + 1;
+    }
+    return BST_OK;
+}
+
+/* Writes one orbit in pieces: at burns, and where it does not exist. */
 static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
                             FILE *stream, track *t, int *written) {
     int pieces = 0;
     char why[sizeof ctx->message] = "";
     find_breaks(scenario, e->czml, t);
     for (int k = 0; k + 1 < t->break_count; k++) {
-        t->from_s = t->breaks[k];
-        t->to_s = t->breaks[k + 1];
-        if (!(t->to_s > t->from_s)) {
-            continue; /* two burns at the same time */
-        }
-        const int64_t rows = rows_of(t);
-        for (int64_t row = 0; row < rows;) {
-            bst_world_state state;
-            t->first = row;
-            while (row < rows && row_state(t, ctx, seconds_of(t, row), &state) == BST_OK) {
-                if (t->kept && row < MOST_KEPT_ROWS) {
-                    t->kept[row] = state;
-                }
-                row++;
-            }
-            if (row < rows && !*why) {
-                snprintf(why, sizeof why, "%s", ctx->message);
-            }
-            if (row > t->first) {
-                BST_TRY(write_piece(ctx, e, stream, t, row - t->first, ++pieces));
-            } else {
-                row++;
-            }
+        if (t->breaks[k + 1] > t->breaks[k]) { /* not two burns at the same time */
+            BST_TRY(write_between(ctx, e, stream, t, t->breaks[k], t->breaks[k + 1], &pieces, why));
         }
     }
     if (*why) {

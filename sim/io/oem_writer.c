@@ -22,7 +22,7 @@ static bst_status write_metadata(bst_ctx *ctx, FILE *stream, const bst_oem_segme
     BST_TRY(s->series.state(s->series.user, ctx, 0, first, &r, &v));
     bst_text_utc(*first, start);
     bst_text_utc(last, stop);
-    int64_t most = s->series.rows > 2 ? s->series.rows - 1 : 1;
+    int64_t most = s->series.rows - 1;
     int lagrange = most < LAGRANGE_DEGREE ? (int)most : LAGRANGE_DEGREE;
     snprintf(degree, sizeof degree, "%d", s->hermite_degree > 0 ? s->hermite_degree : lagrange);
     fputs("\nMETA_START\n", stream);
@@ -33,8 +33,10 @@ static bst_status write_metadata(bst_ctx *ctx, FILE *stream, const bst_oem_segme
     bst_io_kvn_write(stream, "TIME_SYSTEM", "UTC");
     bst_io_kvn_write(stream, "START_TIME", start);
     bst_io_kvn_write(stream, "STOP_TIME", stop);
-    bst_io_kvn_write(stream, "INTERPOLATION", s->hermite_degree > 0 ? "HERMITE" : "LAGRANGE");
-    bst_io_kvn_write(stream, "INTERPOLATION_DEGREE", degree);
+    if (s->series.rows > 1) { /* a single state is not interpolated */
+        bst_io_kvn_write(stream, "INTERPOLATION", s->hermite_degree > 0 ? "HERMITE" : "LAGRANGE");
+        bst_io_kvn_write(stream, "INTERPOLATION_DEGREE", degree);
+    }
     fputs("META_STOP\n\n", stream);
     bst_io_kvn_comment(stream, s->comment);
     return bst_text_stream_ok(ctx, stream);

@@ -193,8 +193,9 @@ static void figures_of_sensor_and_target(void **state) {
     bst_assert_close(number(root, "frame_bytes"), 330.0 * 128 * 64 * 2, 0.0);
     /* electrons per second of a star of V = 0 */
     double v0 = 3.6e10 * BST_PI / 4.0 * 0.15 * 0.15 * (1.0 - 0.4) * 0.7 * 0.7;
-    double sky = v0 * pow(10.0, -0.4 * 22.0) * 9.0 * 0.8, dark = 0.5 * 0.8;
-    double noise = sqrt(sky + dark + 64.0), snr_per_e = sqrt(sharpness(2.0 / 2.35482)) / noise;
+    /* of four pixels, which are read together: the read noise once */
+    double sky = v0 * pow(10.0, -0.4 * 22.0) * 4.0 * 9.0 * 0.8, dark = 4.0 * 0.5 * 0.8;
+    double noise = sqrt(sky + dark + 64.0), snr_per_e = sqrt(sharpness(1.0 / 2.35482)) / noise;
     bst_assert_close(number(sensor, "sky_e"), sky, 1e-9 * sky);
     bst_assert_close(number(sensor, "dark_e"), dark, 1e-12);
     bst_assert_close(number(sensor, "noise_e"), noise, 1e-9);

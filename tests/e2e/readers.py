@@ -104,5 +104,7 @@ def read_tdm(path):
 
 def seconds(utc, epoch):
     """Seconds from one UTC text to another; the runs here meet no leap second."""
-    parse = lambda text: datetime.datetime.fromisoformat(text.rstrip("Z")[:26])  # noqa: E731
-    return (parse(utc) - parse(epoch)).total_seconds()
+    parse = lambda text: datetime.datetime.fromisoformat(text[:26])  # noqa: E731
+    beyond = lambda text: float(f"0.000000{text[26:] or 0}")  # of a microsecond # noqa: E731
+    utc, epoch = utc.rstrip("Z"), epoch.rstrip("Z")
+    return (parse(utc) - parse(epoch)).total_seconds() + beyond(utc) - beyond(epoch)

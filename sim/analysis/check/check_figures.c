@@ -15,39 +15,47 @@
 /* Times of the run at which targets are described. */
 enum { TARGET_TIMES = 3 };
 
-/* Light and noise of a sensor in an exposure. */
+/* Light and noise of a sensor's pixel, as read (binned), in an exposure. */
 typedef struct exposure_noise {
-    double exposure_s, sky_e, dark_e, noise_e, fwhm_px;
+    double exposure_s, sky_e, dark_e, noise_e;
+    double fwhm_px;   /* of the PSF, in pixels of the sensor */
     double snr_per_e; /* of a point source, by its electrons */
 } exposure_noise;
 
 /* Mean over positions in the pixel of sum s^2, s: the pixels' fractions of a point's light. */
 static bst_status mean_sharpness(bst_ctx *ctx, double sigma_px, double *mean) {
+    enum { SIDE = 4 }; /* a Gaussian of a quarter of a pixel is read in pixels of 4 x 4 */
     *mean = 0.0;
-    for (int p = 0; p < 4; p++) {
-        const bst_eval_bound_source source = {.x_px = 0.125 + 0.5 * (p % 2),
-                                              .y_px = 0.125 + 0.5 * (p / 2),
+    for (int p = 0; p < SIDE * SIDE; p++) {
+        const bst_eval_bound_source source = {.x_px = (p % SIDE + 0.5) / SIDE,
+                                              .y_px = (p / SIDE + 0.5) / SIDE,
                                               .sigma_px = sigma_px,
                                               .flux_e = 1.0};
         double powers[2];
         BST_TRY(bst_eval_gaussian_powers(ctx, &source, powers));
-        *mean += 0.25 * powers[0];
+        *mean += powers[0] / (SIDE * SIDE);
     }
     return BST_OK;
 }
 
-static bst_status find_noise(bst_ctx *ctx, const bst_camera *c, double exposure_s,
+/* Pixels are summed before they are read: their light and its noise add up, the read noise is that
+ * of one pixel. */
+static bst_status find_noise(bst_ctx *ctx, const bst_camera *c, const bst_exposure_config *e,
                              exposure_noise *out) {
+    const double side = e->binning > 1 ? (double)e->binning : 1.0, pixels = side * side;
+    const double read_e = bst_camera_read_noise_e(c);
+    const double sky_e = bst_camera_background_e_per_s(c) * e->exposure_s;
+    const double one_e = bst_camera_noise_e(c, sky_e, e->exposure_s);
     bst_psf *psf;
     double sharpness;
-    out->exposure_s = exposure_s;
-    out->sky_e = bst_camera_background_e_per_s(c) * exposure_s;
-    out->dark_e = bst_camera_dark_e(c, exposure_s);
-    out->noise_e = bst_camera_noise_e(c, out->sky_e, exposure_s);
+    out->exposure_s = e->exposure_s;
+    out->sky_e = pixels * sky_e;
+    out->dark_e = pixels * bst_camera_dark_e(c, e->exposure_s);
+    out->noise_e = sqrt(pixels * (one_e * one_e - read_e * read_e) + read_e * read_e);
     BST_TRY(bst_psf_create(ctx, c, &psf));
     out->fwhm_px = bst_psf_equivalent_fwhm_px(psf, bst_camera_centre_x(c), bst_camera_centre_y(c));
     bst_psf_free(psf);
-    BST_TRY(mean_sharpness(ctx, out->fwhm_px / BST_FWHM_PER_SIGMA, &sharpness));
+    BST_TRY(mean_sharpness(ctx, out->fwhm_px / BST_FWHM_PER_SIGMA / side, &sharpness));
     out->snr_per_e = sqrt(sharpness) / out->noise_e;
     return BST_OK;
 }
@@ -101,7 +109,7 @@ static bst_status add_target(bst_ctx *ctx, const subject *s, cJSON *node) {
 static bst_status add_sensor(bst_ctx *ctx, subject *s, cJSON *list) {
     const bst_observer_config *observers = s->scenario->observers.items;
     const exposure_noise *noise = &s->noise;
-    BST_TRY(find_noise(ctx, s->camera, s->sensor->exposure.exposure_s, &s->noise));
+    BST_TRY(find_noise(ctx, s->camera, &s->sensor->exposure, &s->noise));
     cJSON *node = cJSON_CreateObject();
     cJSON_AddItemToArray(list, node);
     cJSON_AddStringToObject(node, "observer", observers[s->observer].name);
