@@ -6,9 +6,9 @@
 
 The list is as mutate.py --bugs reads it. The function of a bug gets a copy with it (see every_function.py), so that the
 libraries are compiled once and each test program is linked once. Each test then runs once without a bug and says which
-bugs' lines it enters; those among them that no test has noticed yet act one at a time (unit tests, scenes of
-e2e_figures_kept) or all together (other end-to-end tests), where a test that fails is repeated with halves of them. What
-is noticed together but not alone counts as not noticed. Unit tests that are near to a bug's file run first.
+bugs' lines it enters; those among them that no test has noticed yet act one at a time (first the unit tests nearest to
+the bugs) or all together (then the scenes of e2e_figures_kept, the other unit tests and the other end-to-end tests),
+where a test that fails is repeated with halves of them. What is noticed together but not alone counts as not noticed.
 
 The log keeps what is done: a run that is ended goes on there. Tests labelled slow and those of the shared library (api,
 python) are left out. A bug outside of a function cannot be judged. Nothing in the tree or the build is changed.
@@ -25,6 +25,7 @@ from every_function import FUNCTION, Function, Library, passes
 from mutate import blank_comments, wilson
 from quick_tree import QuickTree
 
+NEAR, FAR = 6, 1000  # ranks of unit tests that run before all others with one bug at a time, and of tests that are not near
 CHOICE = """
 #ifndef BST_MUTANT_CHOICE
 #define BST_MUTANT_CHOICE
@@ -166,26 +167,31 @@ class Judge:
         if os.path.exists(log):
             with open(log, encoding="utf-8") as file:
                 entered = {int(line) for line in file.read().split()}
+        if not sound and spent >= longest:
+            print(f"whole_suite: {name} is longer than {longest:.0f} s", flush=True)
+            return
         self.done[name] = {"sound": sound, "seconds": round(spent, 2), "entered": sorted(entered)}
         if sound:
             left = sorted(entered & self.alive())
-            found = self.among(command, spent, left) if together else [n for n in left if self.fails(command, spent, [n])[0]]
-            for number in found:
-                self.noticed[number] = name
-                print(f"noticed {number} {self.library.bugs[number][1]['file']} by {name}", flush=True)
+            for part in [left] if together else [[n] for n in left]:
+                for number in self.among(command, spent, part):
+                    self.noticed[number] = name
+                    print(f"noticed {number} {self.library.bugs[number][1]['file']} by {name}", flush=True)
         else:
-            print(f"whole_suite: {name} fails without a bug, or is longer than {longest:.0f} s: {spent:.1f} s", flush=True)
+            print(f"whole_suite: {name} fails without a bug", flush=True)
         self.save()
 
 
 def unit_tests(tree, library):
-    """Names, those near to a bug first."""
-    near = {}
-    for _, item in library.bugs.values():
-        for name in tree.judges_of(item["file"], "unit"):
-            near[name] = near.get(name, 0) + 1
+    """[(name, rank)]: what is likely to notice a bug for its time first, by the least rank among those of any bug."""
+    ranks = {}
+    for function, item in library.bugs.values():
+        text = library.texts[item["file"]]
+        line = text.count("\n", 0, text.index(item["old"])) + 1
+        for rank, name in enumerate(tree.in_order(item["file"], tree.judges_of(item["file"], "unit"), text, line)):
+            ranks[name] = min(rank, ranks.get(name, rank))
     names = [n for n, (labels, _, _) in tree.tests.items() if {"unit", "device"} & set(labels) and "slow" not in labels]
-    return sorted(names, key=lambda n: (n not in near, tree.costs.get(n, tree.expected.get(n, 1.0))))
+    return sorted(((n, ranks.get(n, FAR)) for n in names), key=lambda v: (v[1], tree.costs.get(v[0], tree.expected.get(v[0], 1.0))))
 
 
 def kept_scenes(tree, command):
@@ -200,9 +206,9 @@ def main():
     parser.add_argument("bugs", help="list of bugs: JSON [{file, old, new}]")
     parser.add_argument("--build", default="build")
     parser.add_argument("--log", help="file for the outcomes, from which a run that was ended goes on")
-    parser.add_argument("--suite", choices=["unit", "kept", "e2e", "all"], default="all")
+    parser.add_argument("--suite", choices=["near", "kept", "unit", "e2e", "all"], default="all")
     parser.add_argument("--longest", type=float, default=120.0, metavar="SECONDS", help="leave out tests that need more (120)")
-    parser.add_argument("--tests", default="", help="only those whose names hold this regular expression")
+    parser.add_argument("--tests", default="", help="only those (or scenes) whose names hold this regular expression")
     options = parser.parse_args()
     tree = QuickTree(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), options.build, 2)
     with open(options.bugs, encoding="utf-8") as file:
@@ -213,13 +219,18 @@ def main():
         library.compile()
         judge = Judge(tree, library, options.log, scratch)
         print(f"{len(library.bugs)} bugs, {len(judge.alive())} not noticed yet", flush=True)
-        for name in unit_tests(tree, library) if options.suite in ("unit", "all") else []:
+        units = unit_tests(tree, library)
+        for name, _ in [v for v in units if v[1] < NEAR] if options.suite in ("near", "all") else []:
             if re.search(options.tests, name) and (command := judge.command(name)):
                 judge.run(name, command, options.longest, False)
         if options.suite in ("kept", "all"):
             for name, command in kept_scenes(tree, judge.command("e2e_figures_kept")).items():
-                judge.run(name, command, options.longest, False)
+                if re.search(options.tests, name):
+                    judge.run(name, command, options.longest, True)
         ends = [n for n, (labels, _, _) in tree.tests.items() if "e2e" in labels and "slow" not in labels and n != "e2e_figures_kept"]
+        for name, _ in units if options.suite in ("unit", "all") else []:
+            if re.search(options.tests, name) and (command := judge.command(name)):
+                judge.run(name, command, options.longest, True)
         for name in sorted(ends, key=lambda n: tree.expected.get(n, 1.0)) if options.suite in ("e2e", "all") else []:
             if re.search(options.tests, name) and (command := judge.command(name)):
                 judge.run(name, command, options.longest, True)
