@@ -128,7 +128,7 @@ static void hot_pixels_by_their_law(void **state) {
     bst_sensor_figures_free(&f);
 }
 
-/* Without darks, or anything that tells their level, each figure of them says so; with them none
+/* Without darks, or without bias frames, each figure of them says so; with both none
  * does. */
 static void what_is_missing_is_said(void **state) {
     (void)state;
