@@ -72,6 +72,7 @@ static bst_status open_with(opened *o, const bst_pd_options *options, bst_ctx *c
     static const char *const sets[] = {"/world/star_catalogue=embedded",
                                        "/observers/0/sensors/0/camera/width_px=700",
                                        "/observers/0/sensors/0/camera/height_px=400",
+                                       "/observers/0/sensors/0/camera/psf_fwhm_px=1", /* narrow */
                                        "/observers/0/sensors/0/exposure/exposure_s=0.4",
                                        "/observers/0/sensors/0/camera/detector/em_gain=20"};
     BST_TRY(bst_json_load(ctx, "scenarios/neossat_geo_track.json", &o->json));

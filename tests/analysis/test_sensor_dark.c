@@ -128,9 +128,38 @@ static void hot_pixels_by_their_law(void **state) {
     bst_sensor_figures_free(&f);
 }
 
+/* Without darks, or without bias frames, each figure of them says so; with both none
+ * does. */
+static void what_is_missing_is_said(void **state) {
+    (void)state;
+    static const int of_darks[9] = {
+        BST_SENSOR_DARK,         BST_SENSOR_DARK_MEDIAN,    BST_SENSOR_DSNU,
+        BST_SENSOR_HOT_FRACTION, BST_SENSOR_HOT_MEDIAN,     BST_SENSOR_HOT_SPREAD,
+        BST_SENSOR_READOUT,      BST_SENSOR_PARALLEL_TRAIL, BST_SENSOR_SERIAL_TRAIL};
+    for (int n = 0; n < 4; n++) {
+        bst_ctx ctx = {0};
+        bst_sensor_figures f;
+        bst_sensor_stacks s = make();
+        s.dark.count = n == 1 ? 0 : s.dark.count;
+        s.dark.exposure_s = n == 2 ? 0.0 : s.dark.exposure_s;
+        s.bias.count = n == 3 ? 0 : s.bias.count;
+        bst_assert_ok(&ctx, bst_sensor_figures_compute(&ctx, &s, &f));
+        for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
+            assert_non_null(f.method[i]);
+        }
+        for (int i = 0; i < 9; i++) {
+            const int k = of_darks[i];
+            bool said = strncmp(f.method[k], "not determined: needs darks", 27) == 0;
+            assert_int_equal(said, n > 0);
+            assert_true(n == 0 || isnan(f.figures[k].value));
+        }
+        bst_sensor_figures_free(&f);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(ramps_of_both_directions),
-                                       cmocka_unit_test(shielded_columns_are_left_out),
-                                       cmocka_unit_test(hot_pixels_by_their_law)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ramps_of_both_directions), cmocka_unit_test(shielded_columns_are_left_out),
+        cmocka_unit_test(hot_pixels_by_their_law), cmocka_unit_test(what_is_missing_is_said)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -127,6 +127,23 @@ static void nothing_in_the_way(void **state) {
     assert_true(walk(&path, &wide, 1, at(0, 69)) < 1e-8);
 }
 
+/* On the axis of a cone all ways out are as long: it is left on the side of another direction. */
+static void out_of_the_middle(void **state) {
+    (void)state;
+    const bst_keep_out_zone two[2] = {cone(40, -25, 30), cone(-130, 60, 12)};
+    for (int k = 0; k < 24; k++) {
+        const int i = k % 2;
+        bst_vec3 axis = two[i].axis, towards = at(15.0 * k + 3.0, 5.0 * k - 55.0), out;
+        bst_vec3 side = bst_vec3_cross(bst_vec3_cross(axis, towards), axis);
+        bst_vec3 wanted = bst_vec3_axpy(bst_vec3_scale(axis, cos(two[i].half_angle_rad)),
+                                        sin(two[i].half_angle_rad), bst_vec3_unit(side));
+        assert_true(bst_keep_out_nearest(&two[i], 1, axis, towards, &out));
+        assert_true(bst_vec3_norm(bst_vec3_sub(out, wanted)) < 1e-13);
+        assert_true(bst_keep_out_nearest(two, 2, axis, towards, &out));
+        assert_true(bst_vec3_norm(bst_vec3_sub(out, wanted)) < 1e-13);
+    }
+}
+
 static void inside_of_cones(void **state) {
     (void)state;
     bst_keep_out_route path;
@@ -344,6 +361,7 @@ int main(void) {
         cmocka_unit_test(zones_of_navigation),
         cmocka_unit_test(round_one_cone),
         cmocka_unit_test(nothing_in_the_way),
+        cmocka_unit_test(out_of_the_middle),
         cmocka_unit_test(inside_of_cones),
         cmocka_unit_test(against_brute_force),
     };

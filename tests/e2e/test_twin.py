@@ -143,7 +143,7 @@ class Twin(unittest.TestCase):
         folder = os.path.join(self.folder, "short")
         os.mkdir(folder)
         path = attitudes(numpy.random.default_rng(6), self.path[SAMPLES // 2], 3.0, self.scale_rad)
-        camera = {"width_px": 128, "height_px": 128, "pixel_scale_arcsec": 120, "aperture_m": 0.04, "psf_fwhm_px": 2.2,
+        camera = {"width_px": 148, "height_px": 110, "pixel_scale_arcsec": 120, "aperture_m": 0.04, "psf_fwhm_px": 2.2,
                   "full_well_e": 1e6, "gain_e_per_dn": 4,
                   "detector": {"hot_fraction": 0.001, "hot_median_e_per_s": 400, "hot_spread_dex": 0}}
         runs.run(write_scenario(folder, path, camera, "embedded"), folder + "/run")
@@ -153,7 +153,7 @@ class Twin(unittest.TestCase):
         figures = self.report("short/twin")["figures"]
         self.assertAlmostEqual(figures["chi2_per_pixel_by_header_noise"], 1.0, delta=0.04)
         self.assertGreater(figures["chi2_per_pixel_without_defect_map"], 2)
-        # the twin has the hot pixels (16 expected of 16,384), where they are
+        # the twin has the hot pixels (16 expected of 16,280), where they are
         dark = fits.getdata(folder + "/twin_dark.fits")
         hot = dark > numpy.median(dark) + 300
         self.assertEqual(hot.sum(), figures["pixels_with_a_level_of_their_own"])

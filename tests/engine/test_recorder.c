@@ -75,6 +75,11 @@ static void send_frame(bst_ctx *ctx, bst_recorder *recorder, fake_frame *f, int6
     send(ctx, recorder, BST_CHANNEL_FRAME, &m, m.end_tick);
 }
 
+/* Scale of a frame, arcsec/px: the telescope's focus moves. */
+static double scale_of(int64_t id) {
+    return 3.0 * (1.0 + 0.002 * (double)id);
+}
+
 static void send_truth(bst_ctx *ctx, bst_recorder *recorder, int64_t id, bool dropped) {
     bst_truth *t = calloc(1, sizeof *t + 2 * sizeof(bst_truth_item));
     assert_non_null(t);
@@ -87,6 +92,7 @@ static void send_truth(bst_ctx *ctx, bst_recorder *recorder, int64_t id, bool dr
     t->velocity_bary_mps = (bst_vec3){0, 0, 0};
     t->sun_m = (bst_vec3){0, -1e22, 0}; /* so far away that it bends nothing */
     t->observer_gcrf_m = (bst_vec3){7e6, 0, 0};
+    t->pixel_scale_arcsec = scale_of(id);
     t->count = 2;
     t->items[0] = (bst_truth_item){.kind = BST_SOURCE_STAR, .id = 77, .x_chief_px = 1.5};
     t->items[1] = (bst_truth_item){.kind = BST_SOURCE_OBJECT,
@@ -413,6 +419,21 @@ static void count_log(void *user, bst_log_level level, const char *message) {
     *(int *)user += level == BST_LOG_WARNING;
 }
 
+/* The axes of the frames with a truth are as long as their own pixels. */
+static void scales_are_those_of_frames(const char *file) {
+    static const int ids[4] = {0, 1, 3, 4};
+    for (int i = 0; i < 4; i++) {
+        double cd[2][2];
+        read_key(file, 2 + i, "CD1_1", NULL, &cd[0][0]);
+        read_key(file, 2 + i, "CD1_2", NULL, &cd[0][1]);
+        read_key(file, 2 + i, "CD2_1", NULL, &cd[1][0]);
+        read_key(file, 2 + i, "CD2_2", NULL, &cd[1][1]);
+        for (int axis = 0; axis < 2; axis++) {
+            bst_assert_close(3600.0 * hypot(cd[0][axis], cd[1][axis]), scale_of(ids[i]), 1e-6);
+        }
+    }
+}
+
 /* Frame before truth, truth before frame, truth long before, a dropped frame, a frame whose truth
  * never comes: every frame is written once, with its own truth, and let go. */
 static void test_frames_meet_truth(void **state) {
@@ -469,6 +490,7 @@ static void test_frames_meet_truth(void **state) {
     assert_string_equal(text, "2022-06-16T22:10:01.000000");
     read_key(file, 3, "CRVAL2", NULL, &value);
     bst_assert_close(value, 0.25 / BST_DEG_RAD, 1e-10);
+    scales_are_those_of_frames(file);
     read_key(file, 4, "FRAMEID", NULL, &value);
     bst_assert_close(value, 3.0, 0.0);
     read_key(file, 6, "CRVAL2", NULL, &value);

@@ -180,6 +180,47 @@ static void sharpness_follows_the_binning(void **state) {
     bst_known_psf_free(known);
 }
 
+/* Two opposite neighbours give the light of the pixel between them, in each of four directions, for
+ * an image that is longer along a slant: what they hold are shares of the PSF in their places. */
+static void neighbours_of_a_slanting_image(void **state) {
+    (void)state;
+    static const int way[4][2] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}};
+    bst_ctx ctx = {0};
+    bst_camera camera = telescope(SENSOR);
+    camera.optics.field_columns = camera.optics.field_rows = 0;
+    camera.optics.field.count = 0;
+    camera.optics.spiders.count = 0;
+    camera.optics.wavelengths = 1;
+    camera.optics.zernike_waves.waves[4 - 2] = 0.12; /* out of focus and astigmatic: a line */
+    camera.optics.zernike_waves.waves[5 - 2] = 0.04;
+    camera.optics.zernike_waves.waves[6 - 2] = 0.1;
+    bst_psf *psf = psf_of(&camera);
+    bst_known_psf *known;
+    bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, SENSOR, SENSOR, 0.0, &known));
+    bst_imgproc_gauss *gauss = malloc(sizeof *gauss);
+    assert_non_null(gauss);
+    bst_imgproc_gauss_init(gauss);
+    for (int binning = 1; binning <= 2; binning++) {
+        bst_sharpness sharp = {0};
+        bst_sharpness_set(&sharp, gauss, known, binning, known->sigma_px / binning);
+        double light[4], most = 0.0, least = 1.0;
+        for (int g = 0; g < 4; g++) {
+            light[g] = bst_known_psf_share(known, known->nodes, binning, way[g][0], way[g][1]) +
+                       bst_known_psf_share(known, known->nodes, binning, -way[g][0], -way[g][1]);
+            most = g < 2 ? fmax(most, light[g]) : most;
+            least = g < 2 ? fmin(least, light[g]) : least;
+        }
+        double own = bst_known_psf_share(known, known->nodes, binning, 0.0, 0.0);
+        assert_true(most > 1.3 * least && fabs(light[2] / light[3] - 1.0) > 0.1);
+        for (int g = 0; g < 4; g++) {
+            bst_assert_close((double)sharp.factor[g + 1] * light[g], own, 2e-7 * own);
+        }
+    }
+    free(gauss);
+    bst_known_psf_free(known);
+    bst_psf_free(psf);
+}
+
 /* Against the sum that defines the image, at a corner of the field and where all four mix. */
 static void images_are_those_of_the_place_in_the_field(void **state) {
     (void)state;
@@ -385,6 +426,7 @@ int main(void) {
         cmocka_unit_test(low_rank_finds_the_products_of_an_image),
         cmocka_unit_test(a_known_gaussian_has_a_gaussians_images),
         cmocka_unit_test(sharpness_follows_the_binning),
+        cmocka_unit_test(neighbours_of_a_slanting_image),
         cmocka_unit_test(images_are_those_of_the_place_in_the_field),
         cmocka_unit_test(derivatives_by_motion_are_those_of_the_images),
         cmocka_unit_test(places_and_light_are_right),

@@ -121,6 +121,8 @@ static void check_path(const bst_star_path *p, int way, double mx, double my, do
         sum += p->light[k];
         if (k > 3 && k < p->count - 4) {
             bst_assert_close(p->light[k], 1.0, 0.12);
+        } else if (k > 0 && k < p->count - 1) { /* the PSF dims what is next to an end */
+            bst_assert_close(p->light[k], 1.0, 0.05);
         }
     }
     assert_true(square < rms_px * rms_px);

@@ -1,6 +1,7 @@
 /* Pictures of frames: where pixels and marks are in them, in pictures of other shapes than the
  * frame's. */
 #include <stdlib.h>
+#include <string.h>
 
 #include "sim/io/frame_picture.h"
 #include "tests/test_support.h"
@@ -108,7 +109,40 @@ static void places_in_the_picture(void **state) {
     }
 }
 
+/* A track's label is above the middle of its mark and that of an object below, both to the right of
+ * it: marks at one place leave both legible. */
+static void labels_do_not_meet(void **state) {
+    (void)state;
+    enum { WIDTH = 400, HEIGHT = 200 };
+    static const bst_io_overlay_kind kinds[3] = {BST_OVERLAY_TRACK, BST_OVERLAY_OBJECT,
+                                                 BST_OVERLAY_TARGET};
+    uint16_t pixels[COLUMNS * ROWS] = {0};
+    const double x = 12.5 * 10.0 - 0.5, y = 8.5 * 10.0 - 0.5;
+    for (int k = 0; k < 3; k++) {
+        bst_io_overlay_mark mark = {.kind = kinds[k], .x_px = 12.0, .y_px = 8.0, .radius_px = 1.0};
+        const bst_io_overlay one = {.marks = &mark, .count = 1};
+        uint8_t *without = drawn(pixels, &one, WIDTH, HEIGHT);
+        snprintf(mark.label, sizeof mark.label, "HHH"); /* letters without descenders */
+        uint8_t *with = drawn(pixels, &one, WIDTH, HEIGHT);
+        int low = HEIGHT, high = 0, left = WIDTH;
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            if (memcmp(without + 3 * i, with + 3 * i, 3) != 0) {
+                low = i / WIDTH < low ? i / WIDTH : low;
+                high = i / WIDTH > high ? i / WIDTH : high;
+                left = i % WIDTH < left ? i % WIDTH : left;
+            }
+        }
+        assert_true(left > x + 18.0 && left < x + 30.0);
+        assert_true(high - low >= 4 && high - low <= 10); /* 0.8 of 7 px, and soft edges */
+        assert_true(kinds[k] == BST_OVERLAY_TRACK ? high < y - 5.0 && low > y - 25.0
+                                                  : low > y + 3.0 && high < y + 25.0);
+        free(without);
+        free(with);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(places_in_the_picture)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(places_in_the_picture),
+                                       cmocka_unit_test(labels_do_not_meet)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -30,6 +30,7 @@ CONCERNED = [
     (r"imgproc/(module_calibration|calibrate/camera)", "knowledge"),
     (r"sim/analysis/camera", "calibrate_camera"),
     (r"sim/app/cmd_characterize|sim/analysis/characterize", "characterize"),
+    (r"sim/app/cmd_twin|sim/process/twin", "twin"),
     (r"sim/app/cmd_(process|solve)|sim/process|sim/analysis/solve|sim/io/keyword", "solve recorded detections characterize"),
     (r"sim/app/cmd_(lightcurve|turntable)|sim/analysis/shape", "shapes"),
     (r"imgproc/(extended|module)", "inspection main_job detections"),

@@ -50,13 +50,19 @@ static int teardown(void **state) {
 }
 
 /* A source at a distance from the pole; errors in units of the dark noise. */
-static void add(fixture *f, int i, double radius_px, double predicted, double grid) {
+static void add_bright(fixture *f, int i, double radius_px, double predicted, double grid,
+                       double peak_e) {
     const bst_error_budget_source s = {.x_px = (float)radius_px,
+                                       .peak_e = (float)peak_e,
                                        .nodes_e = (float)(DARK_E * predicted),
                                        .predicted_e = (float)(DARK_E * predicted),
                                        .grid_e = (float)(DARK_E * grid)};
     f->sources[i] = (bst_kernel_source_record){.x_px = s.x_px, .blocks = BLOCKS};
     bst_assert_ok(&f->ctx, bst_error_budget_add(&f->ctx, f->budget, &s));
+}
+
+static void add(fixture *f, int i, double radius_px, double predicted, double grid) {
+    add_bright(f, i, radius_px, predicted, grid, 0.0);
 }
 
 /* Arcs about one centre do not meet if they are further apart than errors reach. */
@@ -72,6 +78,17 @@ static void arcs_side_by_side_do_not_add(void **state) {
     f->paths.gaussian = false;
     far = 0.3 * pow(3.0 / (12.0 - 1.8), 3.0) * 0.4;
     bst_assert_close(bst_error_meeting_sigma(&f->meeting, f->budget, &f->paths), 0.5 + far, 1e-4);
+}
+
+/* What comes from a neighbour is compared with the noise where it lands, whichever of both is
+ * bright: here with twice the noise of the dark. */
+static void noise_is_that_of_the_place(void **state) {
+    fixture *f = *state;
+    add_bright(f, 0, RADIUS_PX, 1.2, 0.0, 3.0 * DARK_E * DARK_E);
+    add(f, 1, RADIUS_PX + 12.0, 0.3, 0.0);
+    double part = 0.3 * pow(3.0 / (12.0 - 1.8), 3.0);
+    bst_assert_close(bst_error_meeting_sigma(&f->meeting, f->budget, &f->paths),
+                     0.6 + part * 0.3 / 2.0, 1e-4);
 }
 
 static void near_arcs_add(void **state) {
@@ -108,6 +125,7 @@ static void a_node_behind_the_camera_meets_all(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(arcs_side_by_side_do_not_add, setup, teardown),
+        cmocka_unit_test_setup_teardown(noise_is_that_of_the_place, setup, teardown),
         cmocka_unit_test_setup_teardown(near_arcs_add, setup, teardown),
         cmocka_unit_test_setup_teardown(grid_errors_add_anywhere, setup, teardown),
         cmocka_unit_test_setup_teardown(a_node_behind_the_camera_meets_all, setup, teardown),

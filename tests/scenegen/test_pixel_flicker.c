@@ -5,7 +5,8 @@
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
-enum { WIDTH = 96, HEIGHT = 40, PIXELS = WIDTH * HEIGHT, FRAMES = 6 };
+/* columns in two chunks of 64, and more rows than that */
+enum { WIDTH = 70, HEIGHT = 140, PIXELS = WIDTH * HEIGHT, FRAMES = 6 };
 
 static const bst_detector_pixel_flicker_config NOISE = {3.0, 1e-3, 2.0};
 /* ends of exposures, s: distances of 0.2 s to 5,000 s, and two reads at once */
@@ -140,7 +141,7 @@ static void pixels_follow_the_recursion(void **state) {
     static float alone[PIXELS], frame[PIXELS];
     static double m[PIXELS][BST_FLICKER_TERMS];
     fixture *f = *state;
-    const bst_window all = {0, 0, WIDTH, HEIGHT}, part = {13, 7, 70, 21};
+    const bst_window all = {0, 0, WIDTH, HEIGHT}, part = {13, 7, 50, 125};
     const double alone_e = sqrt(15.25); /* 3 e-, 2 e- and 1.5 e- */
     set_camera(f);
     f->camera.detector.pixel_flicker_noise = NOISE;

@@ -1,6 +1,7 @@
 /* The whole tracker on simulated detections of the main scenario. */
 #include "tests/tracker/moving_sky.h"
 #include "tracker/identity.h"
+#include "tracker/tracker_internal.h"
 
 typedef struct result {
     int used, in_track, wrong, first_target_frame;
@@ -296,6 +297,43 @@ static void vague_detections(void **state) {
     world_close(&w);
 }
 
+/* The error of a place that is a blend, or at an edge, is added to that of all objects' places
+ * (0.5 px beside 0.02 px); that of an extended one includes its edge. */
+static void blends_are_vague(void **state) {
+    (void)state;
+    static const uint32_t flags[6] = {0,
+                                      BST_DETECTION_BLEND,
+                                      BST_DETECTION_EDGE,
+                                      BST_DETECTION_EXTENDED,
+                                      BST_DETECTION_EXTENDED | BST_DETECTION_EDGE,
+                                      BST_DETECTION_BLEND | BST_DETECTION_EDGE};
+    static const double more_px2[6] = {0.0, 0.25, 0.25, 0.0, 0.0, 0.25};
+    double variance[6];
+    for (int n = 0; n < 6; n++) {
+        static world w;
+        world_open(&w, 6, &plain);
+        (void)expose(&w, 0);
+        int object = 0;
+        while (w.detections->items[object].label != BST_LABEL_OBJECT) {
+            assert_true(++object < w.detections->count);
+        }
+        w.detections->items[object].flags = flags[n];
+        bst_tracker_input input = make_input(&w, 0);
+        (void)bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256);
+        const bst_mtt_detection *found = w.tracker->detections;
+        while (found->x_px != w.detections->items[object].x_px) {
+            assert_true(++found < w.tracker->detections + w.tracker->max_detections);
+        }
+        variance[n] = found->sky.cov_11 + found->sky.cov_22;
+        world_close(&w);
+        /* pixels of 3 arcsec, half a degree from the middle at most: smaller by 1e-4 */
+        bst_assert_close((variance[n] - variance[0]) / pow(3 * AS, 2), 2.0 * more_px2[n], 3e-4);
+        if (n == 0) { /* not less than the place's own error and that of all objects */
+            assert_true(variance[0] > 2.0 * (0.01 + 0.0004) * 0.999 * pow(3 * AS, 2));
+        }
+    }
+}
+
 /* Predictions foresee the telemetry's error and the target's place of the next frame. */
 static void predictions_hold(void **state) {
     (void)state;
@@ -462,6 +500,7 @@ int main(void) {
                                        cmocka_unit_test(a_frame_of_an_uneven_turn),
                                        cmocka_unit_test(a_bad_first_frame),
                                        cmocka_unit_test(vague_detections),
+                                       cmocka_unit_test(blends_are_vague),
                                        cmocka_unit_test(telemetry_wrong_by_any_angle),
                                        cmocka_unit_test(predictions_hold),
                                        cmocka_unit_test(late_navigation),

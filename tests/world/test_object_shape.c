@@ -1,4 +1,5 @@
 /* Objects with a shape in a world: their light, its sampling, and errors of the configuration. */
+#include "sim/core/tangent.h"
 #include "sim/world/scene/field_objects.h"
 #include "sim/world/scene/object_shape.h"
 #include "tests/world/world_support.h"
@@ -238,6 +239,68 @@ static void small_spheres_are_discs(void **state) {
     }
 }
 
+/* An object beside a part of the sensor is in it if its disc is, whatever the distortion makes of
+ * the disc: here 1.5 times as wide as at the boresight. */
+static void discs_of_a_distorted_field(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world_with("{\"name\": \"s\", \"area_m2\": 1e5, " TEST_GX5 "}", "");
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    bst_camera camera = *bst_world_camera(world, 0, 0);
+    camera.width_px = 1000;
+    camera.height_px = 700;
+    camera.pixel_scale_arcsec = 0.02;
+    camera.distortion = (bst_camera_distortion){.k1 = 1e8};
+    bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &camera));
+    bst_scene_object_query query = {.view = view,
+                                    .camera = &camera,
+                                    .span = {0, 100, 100.0001},
+                                    .lit = {0, 0, 1000, 700},
+                                    .window = {0, 0, 1000, 700},
+                                    .q_mid = {0, 0, 0, 1},
+                                    .cone = {{0, 0, 1}, BST_PI},
+                                    .margin_px = 1e9};
+    bst_scene_object_parts parts = {.body = NULL};
+    bst_scene_source source;
+    bool there;
+    bst_assert_ok(&ctx, bst_field_object(&ctx, &query, 0, &parts, &source, &there));
+    assert_true(there);
+    const bst_vec3 place = bst_camera_unproject(&camera, 780.0, 540.0);
+    bst_vec3 axis = bst_vec3_cross(source.apparent_mid, place);
+    query.q_mid = bst_quat_from_rotvec(
+        bst_vec3_scale(bst_vec3_unit(axis), bst_vec3_angle(source.apparent_mid, place)));
+    query.margin_px = 0.0;
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    const double radius = sqrt(1e5 / BST_PI) / source.range_m;
+    const bst_tangent axes = bst_tangent_at(place);
+    for (int k = 0; k < 360; k++) {
+        double at[2], a = k * BST_PI / 180.0;
+        bst_vec3 d =
+            bst_tangent_exp(place, bst_tangent_vector(&axes, radius * cos(a), radius * sin(a)));
+        assert_true(bst_camera_project(&camera, d, &at[0], &at[1]));
+        for (int i = 0; i < 2; i++) {
+            low[i] = fmin(low[i], at[i]);
+            high[i] = fmax(high[i], at[i]);
+        }
+    }
+    assert_true(high[0] - 780.0 > 1.2 * radius / bst_camera_scale_rad(&camera));
+    for (int beyond = 0; beyond < 2; beyond++) { /* the last pixels of the disc, and far from it */
+        const int by = beyond ? 300 : -2;
+        const bst_window windows[4] = {{(int)ceil(high[0]) + by, 0, 50, 700},
+                                       {0, 0, (int)floor(low[0]) - by, 700},
+                                       {0, (int)ceil(high[1]) + by, 1000, 50},
+                                       {0, 0, 1000, (int)floor(low[1]) - by}};
+        for (int k = 0; k < 4; k++) {
+            query.lit = query.window = windows[k];
+            bst_assert_ok(&ctx, bst_field_object(&ctx, &query, 0, &parts, &source, &there));
+            assert_int_equal(there, !beyond);
+        }
+    }
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
 /* Earthlight on a shape is that of the sphere's model where the shape is a sphere. */
 static void earthlight_is_that_of_spheres(void **state) {
     (void)state;
@@ -419,6 +482,7 @@ int main(void) {
         cmocka_unit_test(a_spinning_plate_glints),
         cmocka_unit_test(glints_are_neither_missed_nor_smeared),
         cmocka_unit_test(small_spheres_are_discs),
+        cmocka_unit_test(discs_of_a_distorted_field),
         cmocka_unit_test(earthlight_is_that_of_spheres),
         cmocka_unit_test(facets_have_their_temperatures),
         cmocka_unit_test(light_is_reflected_twice),
