@@ -102,10 +102,10 @@ INLINE void store_quad(float8 t0, float8 t1, float8 t2, float8 t3, float *row) {
     *(loose4 *)(row + 7 * ROW) = n3.hi;
 }
 
-/* Profiles of eight nodes along both axes: 2 radius + 2 taps, zero-padded to a multiple of QUAD,
- * in rows[node][ROW] and columns[tap][BST_BLOCK]. x, y: fractions from the node's pixel to the next;
- * more: widening in PSF variances; wide: 0 (it is 0 for all nodes of the block), 1 (within the law's
- * limit) or 2; height: total along x. */
+/* Profiles of eight nodes along both axes: 2 radius + 2 taps, zero-padded to a multiple of QUAD, in
+ * rows[node][ROW] and columns[tap][BST_BLOCK]. x, y: fractions from the node's pixel to the next;
+ * more: widening in PSF variances; wide: 0 (it is 0 for all nodes of the block), 1 (within the
+ * law's limit) or 2; height: total along x. */
 INLINE void make_profiles(float8 x, float8 y, float8 more, int wide, float8 height, int radius,
                           global const float *law, float *rows, float *columns) {
     int quads = taps_stored(radius);
@@ -164,8 +164,10 @@ static void place_nodes(bst_kernel_node_params p, node_block nodes, int tile_x, 
 #endif
     make_profiles(within_x.lo, within_y.lo, nodes.width.lo, wide, nodes.electrons.lo, radius, law,
                   b->x[0] + PAD, b->y[PAD]);
-    make_profiles(within_x.hi, within_y.hi, nodes.width.hi, wide, nodes.electrons.hi, radius, law,
-                  b->x[8] + PAD, b->y[PAD] + 8);
+    if (nodes.electrons.s8 > 0.0f || nodes.electrons.sc > 0.0f) { /* else no team of it is near */
+        make_profiles(within_x.hi, within_y.hi, nodes.width.hi, wide, nodes.electrons.hi, radius,
+                      law, b->x[8] + PAD, b->y[PAD] + 8);
+    }
     int16 left = x - (radius + tile_x), top = y - (radius + tile_y);
     int16 left0 = team_min(left), left1 = team_max(left);
     int16 top0 = team_min(top), top1 = team_max(top);
@@ -208,7 +210,8 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) 
     float16 l2 = first_line(b, n + 2), l3 = first_line(b, n + 3);
     for (; column + 16 < end; column += 32) {
         float16 r0 = line_of(b, n, column + 16, taps), r1 = line_of(b, n + 1, column + 16, taps);
-        float16 r2 = line_of(b, n + 2, column + 16, taps), r3 = line_of(b, n + 3, column + 16, taps);
+        float16 r2 = line_of(b, n + 2, column + 16, taps);
+        float16 r3 = line_of(b, n + 3, column + 16, taps);
         local float *target = sum + first * STRIDE + column;
         for (int j = first; j < last; j += BST_STAMP_RUN) {
             for (int k = j; k < j + BST_STAMP_RUN; k++) {
