@@ -86,17 +86,13 @@ INLINE float tap_of(float within, float more, float height, int radius, int k,
         int d = k > radius ? k - radius : radius + 1 - k;
         global const float *c = law + BST_LAW_HEAD + (d - 1) * LAW_FLOATS;
         float g = fma(2.0f, within, -1.0f), g2 = g * g;
-        float even = powers(c, DEGREE + 1, 0, g2), odd = powers(c, DEGREE + 1, 1, g2);
-        if (more > 0.0f) {
-            global const float *first = c + DEGREE + 1, *second = first + BST_LAW_FIRST;
-            even = fma(more,
-                       fma(more, powers(second, BST_LAW_SECOND, 0, g2),
-                           powers(first, BST_LAW_FIRST, 0, g2)),
-                       even);
-            odd = fma(more,
-                      fma(more, powers(second, BST_LAW_SECOND, 1, g2),
-                          powers(first, BST_LAW_FIRST, 1, g2)),
-                      odd);
+        int wide = more > 0.0f;
+        float even = law_power(c, LAW_POWERS - 2, more, wide);
+        float odd = law_power(c, LAW_POWERS - 1, more, wide);
+#pragma unroll
+        for (int q = LAW_POWERS - 4; q >= 0; q -= 2) {
+            even = fma(even, g2, law_power(c, q, more, wide));
+            odd = fma(odd, g2, law_power(c, q + 1, more, wide));
         }
         odd *= g;
         return (k > radius ? even + odd : even - odd) * height;
