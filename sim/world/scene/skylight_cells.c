@@ -129,7 +129,7 @@ static int level_of(cell *c, const square *q) {
         edge = fmin(edge, bst_discs_sharp_edge_px(&c->p->discs, middle));
     }
     /* half a diagonal, with a margin for larger pixels off axis and for edges that bend */
-    if (!(edge > q->size / bst_camera_shrink(camera))) {
+    if (!(edge > 0.75 * q->size / bst_camera_shrink(camera))) {
         return -1;
     }
     for (int level = 0; level < BST_SKYLIGHT_LEVELS; level++) {
