@@ -118,9 +118,11 @@ static bool is_right(cell *c, const square *q, int level) {
            agrees(c, q, level, q->size, near);
 }
 
-/* Whether a square is free of blurred edges, and the polynomial of which level is right in it; -1:
- * none. */
+/* Level of the polynomial that is right in a square; -1: none. Where a blurred edge may cross it,
+ * only degree 1 in a small square: its nine places see any edge, which is almost straight, and the
+ * error within it is up to twice what they show. In a large one a disc could lie between them. */
 static int level_of(cell *c, const square *q) {
+    enum { SMALL = 8 };
     const bst_camera *camera = c->p->b->camera;
     const double x = c->x0 + q->i + 0.5 * q->size, y = c->y0 + q->j + 0.5 * q->size;
     double edge = bst_skylight_vignetting_edge_px(camera, x, y);
@@ -129,10 +131,9 @@ static int level_of(cell *c, const square *q) {
         edge = fmin(edge, bst_discs_sharp_edge_px(&c->p->discs, middle));
     }
     /* half a diagonal, with a margin for larger pixels off axis and for edges that bend */
-    if (!(edge > 0.75 * q->size / bst_camera_shrink(camera))) {
-        return -1;
-    }
-    for (int level = 0; level < BST_SKYLIGHT_LEVELS; level++) {
+    const bool crossed = !(edge > 0.75 * q->size / bst_camera_shrink(camera));
+    const int levels = !crossed ? BST_SKYLIGHT_LEVELS : q->size <= SMALL ? 1 : 0;
+    for (int level = 0; level < levels; level++) {
         if (is_right(c, q, level)) {
             return level;
         }
