@@ -47,15 +47,28 @@ static bst_scene_surroundings surroundings_of(const limb_scene *s) {
 /* Low orbits with the limb in the field, and 1 and 5 degrees outside of it, by day and night; in
  * slews, at the terminator, in fine and coarse pixels, and from a geostationary orbit. */
 static const limb_scene scenes[] = {
-    {785e3, 0, 5, 60, {0, 0}, 0.7, false},      {785e3, 0, 5, -160, {0, 0}, 0.7, false},
-    {785e3, -0.3, 5, 60, {0, 0}, 0.7, false},   {785e3, 0.3, 5, 60, {0, 0}, 0.7, false},
-    {785e3, 0.3, 5, -160, {0, 0}, 0.7, false},  {785e3, 1, 5, 60, {0, 0}, 0.7, false},
-    {785e3, 1, 5, -160, {0, 0}, 0.7, false},    {785e3, 5, 5, 60, {0, 0}, 0.7, true},
-    {785e3, 5, 5, -160, {0, 0}, 0.7, true},     {785e3, 0.2, 5, -117, {0, 0}, 0.7, false},
-    {785e3, 0, 5, -117, {0, 0}, 1e-5, false},   {785e3, 0, 5, 60, {0, 0}, 1e-6, false},
-    {785e3, 0.1, 5, 60, {30, 200}, 0.7, false}, {785e3, 0.1, 5, 60, {600, 30}, 1e-4, false},
-    {785e3, 1, 1, 60, {0, 0}, 0.7, false},      {785e3, 1, 30, 60, {0, 0}, 0.7, false},
-    {500e3, 0.5, 8, 100, {0, 3}, 0.7, false},   {3.5786e7, 0.02, 5, 60, {0, 0}, 0.7, false},
+    {785e3, 0, 5, 60, {0, 0}, 0.7, false},
+    {785e3, 0, 5, -160, {0, 0}, 0.7, false},
+    {785e3, -0.3, 5, 60, {0, 0}, 0.7, false},
+    {785e3, 0.3, 5, 60, {0, 0}, 0.7, false},
+    {785e3, 0.3, 5, -160, {0, 0}, 0.7, false},
+    {785e3, 1, 5, 60, {0, 0}, 0.7, false},
+    {785e3, 1, 5, -160, {0, 0}, 0.7, false},
+    {785e3, 5, 5, 60, {0, 0}, 0.7, true},
+    {785e3, 5, 5, -160, {0, 0}, 0.7, true},
+    {785e3, 0.2, 5, -117, {0, 0}, 0.7, false},
+    {785e3, 0, 5, -117, {0, 0}, 1e-5, false},
+    {785e3, 0, 5, 60, {0, 0}, 1e-6, false},
+    {785e3, 0.1, 5, 60, {30, 200}, 0.7, false},
+    {785e3, 0.1, 5, 60, {600, 30}, 1e-4, false},
+    {785e3, 1, 1, 60, {0, 0}, 0.7, false},
+    {785e3, 1, 30, 60, {0, 0}, 0.7, false},
+    {500e3, 0.5, 8, 100, {0, 3}, 0.7, false},
+    {3.5786e7, 0.02, 5, 60, {0, 0}, 0.7, false},
+    /* edges about as dim as the bound */
+    {785e3, 0, 5, 60, {0, 0}, 1e-9, false},
+    {785e3, 0.02, 5, 60, {0, 0}, 3e-10, false},
+    {785e3, 0, 5, 60, {3, 8}, 1e-10, false},
 };
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
