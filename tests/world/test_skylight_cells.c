@@ -99,7 +99,8 @@ static worst worst_of(const bst_camera *camera, const bst_scene_surroundings *ar
     return w;
 }
 
-/* Polynomials are as near to the pixels' own values as is promised: 1e-3 sigma, or 1e-6. */
+/* Polynomials are as near to the pixels' own values as documented: 1e-3 sigma, or 1e-6 of the
+ * light. */
 static void cells_are_within_their_bound(void **state) {
     (void)state;
     for (int c = 0; c < SCENES; c++) {

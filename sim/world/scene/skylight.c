@@ -34,23 +34,6 @@ bool bst_skylight_may_vary(const bst_camera *camera) {
     return bst_skylight_varies(camera) || bst_discs_wanted(camera);
 }
 
-/* Index of the cell that has a position, in steps from the first node; the first or last beyond. */
-static int cell_of(float u, int nodes) {
-    const int i = (int)floorf(u);
-    return i < 0 ? 0 : i > nodes - 2 ? nodes - 2 : i;
-}
-
-/* Bilinear interpolation between nodes. The step is a power of two: the weights are exact, and
- * overlapping maps agree to the bit. */
-static float interpolate(const bst_skylight_lattice *l, float x, float y) {
-    float u = (x - (float)l->x0) / (float)l->step, v = (y - (float)l->y0) / (float)l->step;
-    int i = cell_of(u, l->columns), j = cell_of(v, l->rows);
-    float s = u - (float)i, t = v - (float)j;
-    const float *a = l->value + (size_t)j * (size_t)l->columns + (size_t)i, *b = a + l->columns;
-    float left = a[0] + t * (b[0] - a[0]), right = a[1] + t * (b[1] - a[1]);
-    return left + s * (right - left);
-}
-
 bst_status bst_skylight_create(bst_ctx *ctx, const bst_world *world, const bst_camera *camera,
                                bst_skylight **out) {
     *out = NULL;
@@ -147,7 +130,7 @@ static bst_status paint_sky(bst_ctx *ctx, const bst_skylight_painter *p, bst_sky
     for (int j = 0; j < s->rows; j++) {
         for (int i = 0; i < s->columns; i++) {
             int x = s->x0 + i * s->step, y = s->y0 + j * s->step;
-            double e = uniform + (double)interpolate(l, (float)x, (float)y);
+            double e = uniform + (double)bst_skylight_interpolate(l, (float)x, (float)y);
             if (sky && c->zodiacal) {
                 bst_vec3 d = to_gcrf(p, bst_camera_unproject(camera, x, y));
                 e += p->sun_e * 1e-4 * DEG2_PER_SR * bst_zodiacal_towards(d, p->sun);
@@ -158,37 +141,9 @@ static bst_status paint_sky(bst_ctx *ctx, const bst_skylight_painter *p, bst_sky
     return BST_OK;
 }
 
-/* Total background at a pixel position, electrons per pixel of the exposure; sky_e from
- * paint_sky. *sides: of the terminators. */
-static double paint(const bst_skylight_painter *p, double x, double y, double sky_e,
-                    unsigned *sides) {
-    const bst_camera *camera = p->b->camera;
-    const bst_background_config *c = &camera->background;
-    double seen = sky_e;
-    *sides = 0;
-    if (bst_discs_any(&p->discs)) {
-        bst_disc_light light = bst_discs_light(&p->discs, bst_camera_unproject(camera, x, y));
-        seen = sky_e * (1.0 - light.earth) + p->sun_e * light.sunlight + p->earth_e * light.earth;
-        *sides = light.sides;
-    }
-    double u = (2.0 * x + 1.0) / (double)camera->width_px - 1.0;
-    double v = (2.0 * y + 1.0) / (double)camera->height_px - 1.0;
-    double added = c->stray_e_per_s + c->gradient_e_per_s[0] * u + c->gradient_e_per_s[1] * v +
-                   c->curvature_e_per_s[0] * u * u + c->curvature_e_per_s[1] * u * v +
-                   c->curvature_e_per_s[2] * v * v;
-    double e = seen * bst_camera_illumination(camera, x, y) + p->even_e + added;
-    return fmax(e, 0.0) * p->around->exposure_s;
-}
-
 /* Distance of a corner from an edge within which the edge may be in its cells, px. */
 static double edge_reach_px(const bst_skylight_painter *p) {
     return 1.06 * p->b->step / bst_camera_shrink(p->b->camera);
-}
-
-double bst_skylight_vignetting_edge_px(const bst_camera *camera, double x, double y) {
-    double limit = camera->optics.vignetting.limit_px;
-    double dx = x - bst_camera_centre_x(camera), dy = y - bst_camera_centre_y(camera);
-    return limit > 0.0 ? fabs(hypot(dx, dy) - limit) : INFINITY;
 }
 
 /* Whether no edge of a disc or of the vignetting can be on the sensor, by bounds that need few
@@ -213,10 +168,6 @@ static bool is_far_from_edges(const bst_skylight_painter *p) {
     /* with a margin for distortion, which may bend a side outwards */
     return !bst_discs_any(&p->discs) ||
            bst_discs_none_begins(&p->discs, middle, 1.05 * radius, reach);
-}
-
-double bst_skylight_paint(const bst_skylight_painter *p, int x, int y, unsigned *sides) {
-    return paint(p, x, y, (double)interpolate(&p->b->sky, (float)x, (float)y), sides);
 }
 
 /* Background at a pixel, with the interpolated sky. */
@@ -246,15 +197,16 @@ static double place_at(const bst_skylight *b, double x_px, double y_px) {
 static float paint_node(const bst_skylight *b, int k) {
     const bst_skylight_lattice *n = &b->nodes;
     unsigned sides;
-    return (float)paint(&b->painter, n->x0 + k % n->columns * n->step,
-                        n->y0 + k / n->columns * n->step, (double)b->sky.value[k], &sides);
+    return (float)bst_skylight_paint_at(&b->painter, n->x0 + k % n->columns * n->step,
+                                        n->y0 + k / n->columns * n->step, (double)b->sky.value[k],
+                                        &sides);
 }
 
 /* Paints the nodes around a position on the lattice that are not painted yet. */
 static void paint_around(bst_skylight *b, double x, double y) {
     const bst_skylight_lattice *n = &b->nodes;
-    const int i = cell_of(((float)x - (float)n->x0) / (float)n->step, n->columns);
-    const int j = cell_of(((float)y - (float)n->y0) / (float)n->step, n->rows);
+    const int i = bst_skylight_cell_of(((float)x - (float)n->x0) / (float)n->step, n->columns);
+    const int j = bst_skylight_cell_of(((float)y - (float)n->y0) / (float)n->step, n->rows);
     for (int c = 0; c < 4; c++) {
         const int k = (j + (c >> 1)) * n->columns + i + (c & 1);
         n->value[k] = isnan(n->value[k]) ? paint_node(b, k) : n->value[k];
@@ -280,7 +232,7 @@ double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px) {
                                     .columns = map->columns,
                                     .rows = map->rows,
                                     .value = (float *)(uintptr_t)map->e};
-    return (double)interpolate(&l, (float)x, (float)y);
+    return (double)bst_skylight_interpolate(&l, (float)x, (float)y);
 }
 
 /* Computes the quantities of the sky background that all pixels share. */

@@ -1,4 +1,5 @@
-/* Internal state of the sky background; shared by skylight.c and skylight_cells.c. */
+/* Internal state of the sky background; shared by skylight.c, skylight_paint.c and
+ * skylight_cells.c. */
 #ifndef BST_WORLD_SCENE_SKYLIGHT_INTERNAL_H
 #define BST_WORLD_SCENE_SKYLIGHT_INTERNAL_H
 
@@ -55,7 +56,19 @@ struct bst_skylight {
 bst_status bst_skylight_set_nodes(bst_ctx *ctx, bst_skylight_lattice *l, int step,
                                   bst_window w) BST_MUST_CHECK;
 
-/* Background at a pixel, electrons of the exposure.
+/* Index of the cell that has a position, in steps from the first node; the first or last beyond. */
+int bst_skylight_cell_of(float u, int nodes);
+
+/* Bilinear interpolation between nodes. The step is a power of two: the weights are exact, and
+ * overlapping maps agree to the bit. */
+float bst_skylight_interpolate(const bst_skylight_lattice *l, float x, float y);
+
+/* Total background at a pixel position, electrons per pixel of the exposure; sky_e from
+ * paint_sky. *sides: of the terminators. */
+double bst_skylight_paint_at(const bst_skylight_painter *p, double x, double y, double sky_e,
+                             unsigned *sides);
+
+/* Background at a pixel, with the interpolated sky, electrons of the exposure.
  *
  * Returned:  *sides  of the terminators, as in bst_disc_light */
 double bst_skylight_paint(const bst_skylight_painter *p, int x, int y, unsigned *sides);
