@@ -371,7 +371,7 @@ bool bst_discs_none_begins(const bst_discs *discs, bst_vec3 axis, double radius_
 
 /* Radiance of the Earth's disc, or of its limb glow, at the middle of a time interval. */
 static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, double share,
-                             double *sunlight) {
+                             double *sunlight, unsigned *sides) {
     const bst_scene_body_disc *d = &discs->body[BST_BODY_EARTH];
     double height;
     bst_vec3 normal = normal_at(earth_place(d, k, direction, &height));
@@ -379,12 +379,14 @@ static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, 
     double above = height > 0.0 && discs->limb_scale > 0.0 ? exp(-height / discs->limb_scale) : 0.0;
     above = height > 0.0 ? above : discs->limb_scale > 0.0 ? 1.0 : 0.0;
     double moonlit = fmax(bst_vec3_dot(normal, d->moon), 0.0);
+    *sides = (lit > 0.0 ? 1U : 0U) | (moonlit > 0.0 ? 2U : 0U);
     *sunlight += (d->radiance * lit + d->moonlight * moonlit) * (share + (1.0 - share) * above) +
                  d->night * share;
     return share;
 }
 
-static double moon_radiance(const bst_scene_body_disc *d, int k, bst_vec3 direction) {
+static double moon_radiance(const bst_scene_body_disc *d, int k, bst_vec3 direction,
+                            unsigned *sides) {
     /* position on the disc, in radii */
     bst_vec3 across =
         bst_vec3_axpy(direction, -bst_vec3_dot(direction, d->centre[k]), d->centre[k]);
@@ -395,7 +397,9 @@ static double moon_radiance(const bst_scene_body_disc *d, int k, bst_vec3 direct
         r2 = 1.0;
     }
     bst_vec3 normal = bst_vec3_axpy(p, -sqrt(1.0 - r2), d->centre[k]);
-    return d->radiance * (fmax(bst_vec3_dot(normal, d->sun[k]), 0.0) + MOON_EVEN);
+    double lit = fmax(bst_vec3_dot(normal, d->sun[k]), 0.0);
+    *sides = lit > 0.0 ? 4U : 0U;
+    return d->radiance * (lit + MOON_EVEN);
 }
 
 bst_disc_light bst_discs_light(const bst_discs *discs, bst_vec3 direction) {
@@ -412,17 +416,20 @@ bst_disc_light bst_discs_light(const bst_discs *discs, bst_vec3 direction) {
             double to = edge_at(d, i, (p + 1) * stride, direction) / discs->scale_rad;
             double share = inside(from, to, discs->sigma_px) / d->parts;
             int k = p * stride + stride / 2;
+            unsigned sides = 0;
             from = to;
             if (i == BST_BODY_SUN) {
                 beyond += share * d->radiance;
             } else if (i == BST_BODY_MOON) {
-                beyond += share > 0.0 ? share * moon_radiance(d, k, direction) : 0.0;
+                beyond += share > 0.0 ? share * moon_radiance(d, k, direction, &sides) : 0.0;
             } else {
                 double sunlight = 0.0;
                 light.earth +=
-                    earth_radiance(discs, k, direction, share * d->parts, &sunlight) / d->parts;
+                    earth_radiance(discs, k, direction, share * d->parts, &sunlight, &sides) /
+                    d->parts;
                 light.sunlight += sunlight / d->parts;
             }
+            light.sides |= sides << 3 * p;
         }
     }
     light.sunlight += beyond * (1.0 - light.earth);

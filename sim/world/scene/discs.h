@@ -92,6 +92,9 @@ typedef struct bst_disc_light {
     double sunlight; /* from the Sun and, reflected, from Moon and Earth; stars of V = 0 per
                         steradian */
     double earth;    /* fraction of time and area that the Earth's disc fills */
+    /* bits 3 i to 3 i + 2: whether the place that is seen in time interval i is lit, on the Earth
+     * by Sun and Moon, and on the Moon. They change at terminators and edges. */
+    unsigned sides;
 } bst_disc_light;
 
 /* Light of the discs of Earth, Moon and Sun in a direction; the Earth occults the others.
