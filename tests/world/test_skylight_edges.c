@@ -263,11 +263,10 @@ static void bounds_of_edges_hold(void **state) {
         for (int i = 0; i < SIDE * SIDE; i++) {
             const double x = i % SIDE * 299.0 / (SIDE - 1), y = i / SIDE * 299.0 / (SIDE - 1);
             const bst_vec3 d = bst_camera_unproject(camera, x, y);
-            bool lit, dark;
-            bst_discs_daylight(&discs, d, &lit, &dark);
+            const bool lit = bst_discs_light(&discs, d).sides & 1U;
             edge = fmin(edge, bst_discs_edge_px(&discs, d));
             day = day || lit;
-            night = night || dark;
+            night = night || (bst_discs_any(&discs) && !lit);
         }
         const bool says = bst_discs_none_begins(&discs, (bst_vec3){0, 0, 1}, radius, 34.0);
         const bool has = edge < 34.0 || (day && night);

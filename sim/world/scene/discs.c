@@ -329,17 +329,6 @@ static bst_vec3 normal_at(bst_vec3 near) {
     return bst_vec3_unit((bst_vec3){near.x, near.y, near.z / (1.0 - BST_EARTH_FLATTENING)});
 }
 
-void bst_discs_daylight(const bst_discs *discs, bst_vec3 direction, bool *day, bool *night) {
-    const bst_scene_body_disc *d = &discs->body[BST_BODY_EARTH];
-    *day = *night = false;
-    for (int k = 0; k <= BST_DISC_PARTS && d->present; k += BST_DISC_PARTS / 2) {
-        double height;
-        bool lit = bst_vec3_dot(normal_at(earth_place(d, k, direction, &height)), d->sun[k]) > 0.0;
-        *day = *day || lit;
-        *night = *night || !lit;
-    }
-}
-
 /* Whether the terminator of the Earth, whose disc fills all directions up to radius_rad from an
  * axis, is in none of them. */
 static bool no_terminator(const bst_scene_body_disc *d, bst_vec3 axis, double radius_rad) {

@@ -70,17 +70,12 @@ static inline bool bst_discs_wanted(const bst_camera *camera) {
 double bst_discs_share(const bst_discs *discs, const bst_camera *camera, int body,
                        bst_window window);
 
-/* Whether the place of the Earth's surface that is nearest to a direction (unit, camera axes) is
- * lit by the Sun, and whether it is dark: both if that changes during the exposure, neither if the
- * Earth is not rendered. */
-void bst_discs_daylight(const bst_discs *discs, bst_vec3 direction, bool *day, bool *night);
-
 /* Distance (px at the boresight's scale) of a direction (unit, camera axes) from the nearest edge
  * of a disc during the exposure, minus the reach of the disc's light. */
 double bst_discs_edge_px(const bst_discs *discs, bst_vec3 direction);
 
 /* True only if no direction up to radius_rad from an axis (unit, camera axes) is within `px` of an
- * edge by bst_discs_edge_px, and bst_discs_daylight is the same in all of them. */
+ * edge by bst_discs_edge_px, and the Sun lights the Earth in all of them or in none. */
 bool bst_discs_none_begins(const bst_discs *discs, bst_vec3 axis, double radius_rad, double px);
 
 /* Distance of a direction from the nearest blurred edge at the limits and middles of the time
