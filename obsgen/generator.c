@@ -387,6 +387,7 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
         filtered ? (bst_obsgen_path_px){f->streak_dx_px / g->binning, f->streak_dy_px / g->binning}
                  : (bst_obsgen_path_px){0.0, 0.0};
     g->streak = filtered ? length : 0.0;
+    g->followed = f->followed && !g->smeared;
     g->path.count = 0;
     bst_generator_set_response(g, f);
     BST_TRY(set_path(ctx, g, f));
@@ -498,6 +499,21 @@ static int generated_by_row(const void *a, const void *b) {
     return (p->x_px > q->x_px) - (p->x_px < q->x_px);
 }
 
+/* Adds the uncertainty of the camera's bend to all places, as imgproc/detect/camera_motion_left.c.
+ */
+static void widen_by_bend(bst_generator *g, const bst_generator_frame *f) {
+    for (int i = 0; i < g->count; i++) {
+        bst_detection *d = &g->items[i].detection;
+        bool drawn = g->items[i].drawn;
+        if (g->followed) {
+            bst_camera_motion_widen_drawn(f->bend_x_px, f->bend_y_px, d);
+            continue;
+        }
+        bst_camera_motion_widen(f->bend_x_px, f->bend_y_px, drawn ? f->bend_x_px : 0.0,
+                                drawn ? f->bend_y_px : 0.0, d);
+    }
+}
+
 bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f,
                              bst_generator_result *out) {
     assert(g && f && f->truth && out && f->truth->count >= 0 && f->exposure_s > 0.0);
@@ -548,12 +564,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
         BST_TRY(bst_false_alarms_draw(ctx, g));
         bst_false_alarms_cosmic_rays(g);
     }
-    for (int i = 0; i < g->count; i++) {
-        bst_detection *d = &g->items[i].detection;
-        bool drawn = g->items[i].drawn;
-        bst_camera_motion_widen(f->bend_x_px, f->bend_y_px, drawn ? f->bend_x_px : 0.0,
-                                drawn ? f->bend_y_px : 0.0, d);
-    }
+    widen_by_bend(g, f);
     qsort(g->items, (size_t)g->count, sizeof *g->items, generated_by_row);
     *out = (bst_generator_result){.items = g->items,
                                   .count = g->count,
@@ -567,6 +578,8 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
                                   .faint_light_e = g->faint_light_e,
                                   .faint_square_e2 = g->faint_square_e2,
                                   .streak_px = g->streak * g->binning,
+                                  .bend_before_px = g->bend_before * g->binning,
+                                  .bend_after_px = g->bend_after * g->binning,
                                   .smeared = g->smeared,
                                   .shared_dx_px = g->fit_path.dx,
                                   .shared_dy_px = g->fit_path.dy};

@@ -3,6 +3,7 @@
 #define BST_OBSGEN_GENERATOR_H
 
 #include "boresight/camera.h"
+#include "boresight/camera_motion.h"
 #include "boresight/messages.h"
 #include "boresight/rng.h"
 #include "obsgen/calibration.h"
@@ -66,6 +67,7 @@ typedef struct bst_generator_frame {
     /* star streak at the window's centre and its bend (bst_camera_motion_bend) as image processing
      * takes them from telemetry, sensor px */
     double streak_dx_px, streak_dy_px, bend_x_px, bend_y_px;
+    bool followed; /* image processing draws the camera's whole path (imgproc/measure/own_path.h) */
     double bend_sigma_px; /* 1 sigma of the bend per axis by telemetry's noise, sensor px */
     /* true path of a star there at path_count equal steps of the exposure, minus its mean, sensor
      * px; fewer than 2: straight and uniform */
@@ -94,12 +96,21 @@ typedef struct bst_generator_result {
     /* per pixel, of sources below the clip of background and noise: mean light and mean squared
      * light */
     double faint_light_e, faint_square_e2;
-    double streak_px; /* streak length of the star filter; sensor px */
-    bool smeared;     /* stars moved further than is filtered for */
+    double streak_px;                     /* streak length of the star filter; sensor px */
+    double bend_before_px, bend_after_px; /* 1 sigma of the bend, without and with bright streaks */
+    bool smeared;                         /* stars moved further than is filtered for */
     /* displacement that all streaks of stars share: direction of the streaks, and variances along
      * and across it, sensor px */
     double shared_dx_px, shared_dy_px, shared_along_px2, shared_across_px2;
 } bst_generator_result;
+
+/* Sets the displacement that all streaks of stars share, and where the camera moved unevenly all
+ * sources, as image processing states it (imgproc/detect/camera_motion_left.c).
+ *
+ * Given:     motion  by telemetry; not read where frame->followed is false */
+void bst_generator_set_shared(const bst_camera_motion *motion, const bst_camera *camera,
+                              const bst_generator_frame *frame, const bst_generator_result *made,
+                              bst_detections *out);
 
 /* Generates the detections of a frame. Random draws depend only on key, exposure number and source
  * identities. Errors: BST_ERR_MEMORY. */

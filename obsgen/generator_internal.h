@@ -98,6 +98,7 @@ struct bst_generator {
     /* width of the images relative to the fitted ones, by deviations of the path */
     double widening;
     double path_rms_px; /* of the true path about the fitted one, per axis */
+    bool followed;      /* image processing draws the whole path: its places have no bias */
     bool uneven;        /* the path is far from uniform: filter outputs follow `outputs` */
     bst_path_outputs outputs;
     /* lead of a point's fit over a streak's on an uneven path, by light level; see point_lead() */

@@ -34,6 +34,10 @@ static void saturated_bias(const bst_generator *g, const generator_source *s, do
 static void shared_bias(const bst_generator *g, const generator_source *s, bool as_streak,
                         double light, double bias[2]) {
     bool shared = s->star || s->broken || g->path.count < 3;
+    bias[0] = bias[1] = 0.0;
+    if (g->followed && !s->saturated) {
+        return;
+    }
     if (shared && as_streak && s->saturated && !bst_generator_is_uniform(g)) {
         saturated_bias(g, s, light, bias);
         return;

@@ -472,6 +472,7 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
                                  e->window.y0 + 0.5 * (e->window.height - 1), &frame.streak_dx_px,
                                  &frame.streak_dy_px);
         bst_camera_motion_bend(&motion, camera, &frame.bend_x_px, &frame.bend_y_px);
+        frame.followed = bst_camera_motion_is_uneven(&motion, camera, frame.sigma_px);
         frame.bend_sigma_px = motion.bend_sigma_rad / bst_camera_scale_rad(camera);
     }
     bst_generator_result made;
@@ -479,8 +480,7 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
     out->background_e = made.background_e;
     out->noise_e = made.noise_e;
     out->threshold_snr = made.threshold_snr;
-    bst_camera_motion_set_shared(made.shared_dx_px, made.shared_dy_px, made.shared_along_px2,
-                                 made.shared_across_px2, out);
+    bst_generator_set_shared(&motion, bst_knowledge_camera(o->knowledge), &frame, &made, out);
     out->stars_identified = 0;
     out->count = made.count < capacity ? made.count : capacity;
     out->lost = made.lost + made.count - out->count;

@@ -12,6 +12,7 @@ set(bst_costs
   e2e_export 11  e2e_planes 11  e2e_bad_input 11  imgproc_streaks 11  scenegen_hard_cases 11
   headers_compile_alone 11  optics_psf_colour 7  e2e_bench 10  e2e_random_labels 10  e2e_seeds 10
   e2e_calframes 10  e2e_loop_latency 10  imgproc_false_alarms 10  e2e_faint_sky 9  e2e_outputs 9
+  e2e_settling 9
   e2e_constellation 9  e2e_day_modes 9  e2e_hostile_input 9  world_ephemeris 9  e2e_install 9
   control_archive 4  imgproc_statistics 8  python_program_plugins 8  scenegen_extended_source 8
   headers_words 8  python_examples 8  e2e_repeat 8  e2e_manoeuvre 8  e2e_pd 8  e2e_new 8

@@ -260,17 +260,6 @@ static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_img
     return BST_OK;
 }
 
-/* Adds the uncertainty of the path's bend to a streak's covariance, unless it is measured. */
-static void add_bend_covariance(const bst_imgproc *ip, const bst_locate_frame *f,
-                                const bst_imgproc_found *found, bst_detection *d) {
-    const bst_imgproc_shape *s = &found->source.shape;
-    if (f->motion && !found->joined) {
-        double x, y;
-        bst_camera_motion_bend(f->motion, &ip->camera, &x, &y);
-        bst_camera_motion_widen(x, y, f->binning * s->bend_x_px, f->binning * s->bend_y_px, d);
-    }
-}
-
 /* Detection in full-sensor pixels from a located source. */
 static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
                             const bst_imgproc_found *found) {
@@ -291,7 +280,7 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     double rate = s->flux_e / fmax(ip->exposure_s, 1e-9);
     d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
     d.flags = found->flags;
-    add_bend_covariance(ip, f, found, &d);
+    bst_imgproc_add_bend_covariance(&ip->camera, f, found, &d);
     d.label = found->label;
     d.label_probability = found->label_probability;
     return d;
@@ -328,6 +317,7 @@ static void set_frame_view(bst_imgproc *ip, const bst_imgproc_frame *frame,
                                   .camera = &ip->camera,
                                   .binning = frame->binning,
                                   .pool = pool};
+    bst_imgproc_set_departure(ip);
     ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
     ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
     ip->left = (bst_stack_frame){.signal = bst_imgproc_signal_of(ip, frame),

@@ -39,6 +39,7 @@ struct bst_imgproc {
     /* of the latest frame */
     bst_locate_frame view;
     bst_camera_motion motion;
+    bst_path_departure departure;
     double exposure_s, binning, streak_px;
     bool smeared, windowed;
     double followed_sigma_e; /* noise of the flux of a followed streak, e-; 0: none was followed */
@@ -66,6 +67,12 @@ const uint8_t *bst_imgproc_find_silhouettes(bst_imgproc *ip, const bst_imgproc_f
                                             const bst_camera_motion *motion, double sigma_px,
                                             int saturated_dn);
 
+/* Sets the departure of the camera's path from a quadratic one, and whether it matters to points,
+ * in ip->view. */
+void bst_imgproc_set_departure(bst_imgproc *ip);
+/* Adds the uncertainty of the camera's bend to the covariance of a source's place. */
+void bst_imgproc_add_bend_covariance(const bst_camera *camera, const bst_locate_frame *frame,
+                                     const bst_imgproc_found *found, bst_detection *detection);
 /* Corrects the camera motion by the star streaks that ip->streak_motion has. */
 void bst_imgproc_correct_motion(bst_imgproc *ip, double binning, bst_camera_motion *motion);
 /* Sets the covariance of the displacement that all star streaks of a frame share.

@@ -108,12 +108,42 @@ static void make_profile(const bst_imgproc_gauss *psf, double centre, double sig
     }
 }
 
+double bst_imgproc_shape_speed(const bst_imgproc_shape *s) {
+    double speed = hypot(s->dx_px, s->dy_px) + 6.0 * hypot(s->bend_x_px, s->bend_y_px);
+    return s->departure ? speed + s->departure->speed_px : speed;
+}
+
+void bst_imgproc_shape_reach(const bst_imgproc_shape *s, double *x_px, double *y_px) {
+    *x_px = 0.5 * fabs(s->dx_px) + fabs(s->bend_x_px);
+    *y_px = 0.5 * fabs(s->dy_px) + fabs(s->bend_y_px);
+    if (s->departure) {
+        *x_px += s->departure->reach_px[0];
+        *y_px += s->departure->reach_px[1];
+    }
+}
+
+void bst_path_departure_finish(bst_path_departure *d) {
+    const int last = BST_PATH_KNOTS - 1;
+    d->speed_px = d->reach_px[0] = d->reach_px[1] = 0.0;
+    d->variance[0] = d->variance[1] = d->variance[2] = 0.0;
+    for (int k = 0; k <= last; k++) {
+        const double x = d->x_px[k], y = d->y_px[k], weight = k % last ? 1.0 : 0.5;
+        d->reach_px[0] = fmax(d->reach_px[0], fabs(x));
+        d->reach_px[1] = fmax(d->reach_px[1], fabs(y));
+        d->variance[0] += weight * x * x / last;
+        d->variance[1] += weight * x * y / last;
+        d->variance[2] += weight * y * y / last;
+        if (k > 0) {
+            const double step = hypot(x - d->x_px[k - 1], y - d->y_px[k - 1]);
+            d->speed_px = fmax(d->speed_px, last * step);
+        }
+    }
+}
+
 /* Number of quadrature nodes along a streak, from its length in sigma. */
 static int node_count(const bst_imgproc_shape *shape) {
     /* path length at the largest speed, which occurs at an end */
-    double length =
-        (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
-        shape->sigma_px;
+    double length = bst_imgproc_shape_speed(shape) / shape->sigma_px;
     /* Gauss-Legendre on a uniform path: error below 1e-5 of the peak up to 60 sigma, 2e-8 at 5
      * sigma */
     return length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
@@ -145,9 +175,8 @@ void bst_imgproc_gauss_render(const bst_imgproc_gauss *psf, const bst_imgproc_sh
     const double *weight = psf->weight + nodes * (nodes - 1) / 2;
     profile px, py;
     for (int k = 0; k < nodes; k++) {
-        double bow = 6.0 * node[k] * node[k] - 0.5;
-        double x = shape->x_px + node[k] * shape->dx_px + bow * shape->bend_x_px;
-        double y = shape->y_px + node[k] * shape->dy_px + bow * shape->bend_y_px;
+        double x, y, bow;
+        bst_imgproc_shape_at(shape, node[k], &x, &y, &bow);
         make_profile(psf, x - stamp->x0, shape->sigma_px, stamp->width, &px);
         make_profile(psf, y - stamp->y0, shape->sigma_px, stamp->height, &py);
         for (int j = 0; j < py.count; j++) {
@@ -169,4 +198,7 @@ void bst_imgproc_shape_path_variance(const bst_imgproc_shape *s, double out[3]) 
     out[0] = s->dx_px * s->dx_px / 12.0 + s->bend_x_px * s->bend_x_px / 5.0;
     out[1] = s->dx_px * s->dy_px / 12.0 + s->bend_x_px * s->bend_y_px / 5.0;
     out[2] = s->dy_px * s->dy_px / 12.0 + s->bend_y_px * s->bend_y_px / 5.0;
+    for (int k = 0; k < 3 && s->departure; k++) {
+        out[k] += s->departure->variance[k];
+    }
 }

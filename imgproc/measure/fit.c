@@ -54,8 +54,9 @@ bst_imgproc_stamp bst_fit_stamp(const bst_imgproc_source *source, double reach_p
     assert(source && reach_px > 0.0 && max_side > 0 && width > 0 && height > 0);
     const bst_imgproc_shape *s = &source->shape;
     double limit = 0.5 * (max_side - 2);
-    double rx = fmin(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + reach_px, limit);
-    double ry = fmin(0.5 * fabs(s->dy_px) + fabs(s->bend_y_px) + reach_px, limit);
+    double half_x, half_y;
+    bst_imgproc_shape_reach(s, &half_x, &half_y);
+    double rx = fmin(half_x + reach_px, limit), ry = fmin(half_y + reach_px, limit);
     int x0 = (int)fmax(floor(s->x_px - rx + 0.5), 0.0);
     int y0 = (int)fmax(floor(s->y_px - ry + 0.5), 0.0);
     int x1 = (int)fmin(floor(s->x_px + rx + 0.5), width - 1.0);

@@ -8,8 +8,10 @@
 #include "imgproc/detect/blooming.h"
 #include "imgproc/measure/cosmic_ray.h"
 #include "imgproc/measure/light_scale.h"
+#include "imgproc/measure/own_path.h"
 #include "imgproc/measure/pair_split.h"
 #include "imgproc/measure/peak_centroid.h"
+#include "imgproc/measure/same_streak.h"
 #include "imgproc/measure/source_moments.h"
 #include "sim/core/pages.h"
 
@@ -90,6 +92,11 @@ static bst_imgproc_source initial_source(const bst_imgproc_locator *l, const bst
         .x_px = found->top_x_px, .y_px = found->top_y_px, .sigma_px = f->sigma_px};
     if (streak) {
         bst_peak_centroid_star_path(f, &s.shape);
+    } else {
+        bst_peak_centroid_camera_path(f, &s.shape);
+    }
+    if (f->uneven) {
+        bst_peak_centroid_on_path(f, &s.shape);
     }
     return s;
 }
@@ -109,8 +116,9 @@ static void start_at_peak(const bst_imgproc_locator *l, const bst_locate_frame *
 
 /* Updates the longest source path of the frame. */
 static void update_longest_path(bst_imgproc_locator *l, const bst_imgproc_shape *s) {
-    l->longest_px = fmax(l->longest_px, fmax(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px),
-                                             0.5 * fabs(s->dy_px) + fabs(s->bend_y_px)));
+    double half_x, half_y;
+    bst_imgproc_shape_reach(s, &half_x, &half_y);
+    l->longest_px = fmax(l->longest_px, fmax(half_x, half_y));
 }
 
 /* True if the matched filters do not decide between point and streak shape. A fit lowers chi-square
@@ -118,8 +126,8 @@ static void update_longest_path(bst_imgproc_locator *l, const bst_imgproc_shape 
  * interpolation errors and by light of neighbours. In a frame with star streaks, a point is always
  * fitted as both. */
 static bool is_shape_ambiguous(const bst_locate_frame *f, const bst_imgproc_found *found) {
-    if (!f->filter->streak) {
-        return false;
+    if (!f->filter->streak || f->uneven) { /* filters do not know an uneven path */
+        return f->filter->streak;
     }
     if (!found->streak) {
         double other = (double)bst_filter_streak_at(f->filter, found->peak_x, found->peak_y);
@@ -199,8 +207,9 @@ static void use_filter_peak(const bst_imgproc_locator *l, const bst_locate_frame
 /* Half width and height of a source's light, px. */
 static void half_extent(const bst_locate_frame *f, const bst_imgproc_shape *s, double *half_x,
                         double *half_y) {
-    *half_x = 0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + 2.0 * f->sigma_px;
-    *half_y = 0.5 * fabs(s->dy_px) + fabs(s->bend_y_px) + 2.0 * f->sigma_px;
+    bst_imgproc_shape_reach(s, half_x, half_y);
+    *half_x += 2.0 * f->sigma_px;
+    *half_y += 2.0 * f->sigma_px;
 }
 
 /* Flags a source whose light is cut by the frame's edge. */
@@ -258,11 +267,25 @@ static void set_flags(const bst_imgproc_locator *l, const bst_locate_frame *f,
     }
 }
 
+/* True if a source may have a path of its own in a frame in which the camera moved unevenly: points
+ * where stars are streaks, and what has the stars' path if its pixels deny that. */
+static bool is_off_path(const bst_locate_frame *f, const bst_imgproc_found *found) {
+    const double pixels = found->source.pixels;
+    return found->streak != f->filter->streak ||
+           found->source.chi_square > pixels + 4.0 * sqrt(2.0 * pixels);
+}
+
 /* Fits an elongated point again as a streak of its own, whose light may reach the frame's edge.
  * Full pixels on its way do not make it saturated: a spike of a bright star ends in the star. */
 static void fit_own_streak(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
-    bst_source_moments_own_streak(w, i, found);
-    found->own_streak = found->streak;
+    if (w->f->uneven) {
+        if (is_off_path(w->f, found)) {
+            bst_own_path_fit(w, i, found);
+        }
+    } else {
+        bst_source_moments_own_streak(w, i, found);
+    }
+    found->own_streak = found->streak && (!w->f->uneven || found->own_path);
     if (found->own_streak) {
         flag_edge(w->f, found);
         if (is_outside(w->f, &found->source.shape)) {
@@ -426,8 +449,8 @@ static void finish_source(const bst_imgproc_worker *w, int i, bst_imgproc_found 
     }
     set_flags(w->l, f, found);
     bool alone = !(found->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE));
-    if (alone && !found->rough && !found->streak && found->label == BST_LABEL_UNKNOWN &&
-        found->snr >= BST_EXTENT_SNR) {
+    if (alone && !found->rough && (!found->streak || f->uneven) &&
+        found->label == BST_LABEL_UNKNOWN && found->snr >= BST_EXTENT_SNR) {
         fit_own_streak(w, i, found);
     }
     bst_source_moments_measure(w, i, found, 0.0);
@@ -511,34 +534,6 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
     process_group(l, f, 0, l->count, finish_source);
 }
 
-/* True if two streaks are fits of the same light: one line, of which they share more
- * than half of the shorter one. */
-static bool is_same_streak(const bst_locate_frame *f, const bst_imgproc_shape *a,
-                           const bst_imgproc_shape *b) {
-    double length = fmax(hypot(a->dx_px, a->dy_px), 1e-6);
-    double c = a->dx_px / length, s = a->dy_px / length;
-    double ex = b->x_px - a->x_px, ey = b->y_px - a->y_px;
-    double across = fabs(c * ey - s * ex), end = 0.5 * fabs(c * b->dy_px - s * b->dx_px);
-    double along = fabs(c * ex + s * ey);
-    /* two lines within the FWHM are one to the fit */
-    double apart = BST_FWHM_PER_SIGMA * f->sigma_px;
-    /* they share (length + other) / 2 - along, more than half of the shorter one */
-    double longer = fmax(length, hypot(b->dx_px, b->dy_px));
-    return along < 0.5 * longer && across < apart && end < apart;
-}
-
-/* True if another source of the frame is a streak of the same light. */
-static bool is_found_already(const bst_imgproc_locator *l, const bst_locate_frame *f, int i,
-                             const bst_imgproc_shape *streak) {
-    for (int k = 0; k < l->count; k++) {
-        const bst_imgproc_found *o = &l->found[k];
-        if (k != i && o->streak && !o->dropped && is_same_streak(f, &o->source.shape, streak)) {
-            return true;
-        }
-    }
-    return false;
-}
-
 bool bst_locate_again(bst_imgproc_locator *l, const bst_locate_frame *f, int i) {
     assert(l && f && i >= 0 && i < l->count);
     bst_imgproc_worker w = {l, f, &l->fits[0]};
@@ -554,23 +549,12 @@ bool bst_locate_again(bst_imgproc_locator *l, const bst_locate_frame *f, int i) 
     }
     finish_source(&w, i, &found);
     /* streaks were joined before: this one would be a second detection of one */
-    if (found.dropped || (found.own_streak && is_found_already(l, f, i, &found.source.shape))) {
+    if (found.dropped ||
+        (found.own_streak && bst_same_streak_found(l, f, i, &found.source.shape))) {
         return false;
     }
     l->found[i] = found;
     return true;
-}
-
-void bst_locate_join_streaks(bst_imgproc_locator *l, const bst_locate_frame *f) {
-    assert(l && f);
-    for (int i = 1; i < l->count; i++) {
-        bst_imgproc_found *fainter = &l->found[i];
-        for (int k = 0; fainter->own_streak && !fainter->dropped && k < i; k++) {
-            const bst_imgproc_found *o = &l->found[k];
-            fainter->dropped = o->own_streak && !o->dropped &&
-                               is_same_streak(f, &o->source.shape, &fainter->source.shape);
-        }
-    }
 }
 
 /* Keeps a source at the filter's peak without a fit. */

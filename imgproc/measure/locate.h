@@ -28,6 +28,7 @@ typedef struct bst_imgproc_found {
     unsigned flags;  /* BST_DETECTION_... */
     bool streak;     /* the fitted shape is not a point */
     bool own_streak; /* a point that was fitted again as a streak */
+    bool own_path;   /* its path was fitted beside the camera's uneven motion: own_path.h */
     bool joined;     /* put together from fragments: streak_fragments.h */
     bool dropped;
     bool bleed;               /* its charge blooms along columns: blooming.h */
@@ -97,6 +98,9 @@ typedef struct bst_locate_frame {
     double excess;   /* variance of shot noise per electron: bst_camera_excess_noise */
     double sigma_px; /* of the PSF, in this frame's pixels */
     const bst_camera_motion *motion; /* NULL: stars are points */
+    /* of the camera's motion, which all sources share; NULL: none that matters to streaks */
+    const bst_path_departure *departure;
+    bool uneven; /* bend and departure matter to points, too */
     const bst_camera *camera;
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
     bst_parallel *pool; /* thread pool of the loops; NULL: the caller's thread */

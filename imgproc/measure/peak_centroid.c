@@ -59,6 +59,61 @@ void bst_peak_centroid_star_path(const bst_locate_frame *f, bst_imgproc_shape *s
     s->dy_px /= f->binning;
     s->bend_x_px /= f->binning;
     s->bend_y_px /= f->binning;
+    s->departure = f->departure;
+}
+
+void bst_peak_centroid_camera_path(const bst_locate_frame *f, bst_imgproc_shape *s) {
+    if (!f->uneven) {
+        return;
+    }
+    bst_peak_centroid_star_path(f, s);
+    if (f->filter->streak) { /* no star: how it moves is not known, but how the camera does */
+        s->dx_px = s->dy_px = 0.0;
+    }
+}
+
+/* Mean of the point filter's output along a path, at whole pixels; 0 outside the frame. */
+static double mean_on_path(const bst_locate_frame *f, const bst_imgproc_shape *path, double x,
+                           double y) {
+    double sum = 0.0;
+    for (int k = 0; k < BST_PATH_KNOTS; k++) {
+        double px, py, bow;
+        bst_imgproc_shape_at(path, (double)k / (BST_PATH_KNOTS - 1) - 0.5, &px, &py, &bow);
+        const int u = (int)floor(x + px + 0.5), v = (int)floor(y + py + 0.5);
+        if (u >= 0 && v >= 0 && u < f->width && v < f->height) {
+            sum += (double)bst_filter_point_at(f->filter, u, v);
+        }
+    }
+    return sum / BST_PATH_KNOTS;
+}
+
+void bst_peak_centroid_on_path(const bst_locate_frame *f, bst_imgproc_shape *shape) {
+    enum { ACROSS = 2 };
+    bst_imgproc_shape path = *shape;
+    path.x_px = path.y_px = 0.0;
+    double half_x, half_y, best = -INFINITY;
+    bst_imgproc_shape_reach(&path, &half_x, &half_y);
+    const double reach = hypot(half_x, half_y);
+    if (reach < 1.0) {
+        return;
+    }
+    /* the axis of the path's moments */
+    double m[3];
+    bst_imgproc_shape_path_variance(&path, m);
+    const double angle = 0.5 * atan2(2.0 * m[1], m[0] - m[2]), ex = cos(angle), ey = sin(angle);
+    const int along = (int)ceil(reach);
+    const double from_x = shape->x_px, from_y = shape->y_px;
+    for (int a = -along; a <= along; a++) {
+        for (int b = -ACROSS; b <= ACROSS; b++) {
+            const double x = from_x + a * ex - b * ey, y = from_y + a * ey + b * ex;
+            const double mean = mean_on_path(f, &path, x, y);
+            if (mean > best) {
+                best = mean;
+                shape->x_px = x;
+                shape->y_px = y;
+            }
+        }
+    }
 }
 
 void bst_peak_centroid_set_laws(bst_imgproc_locator *l, const bst_locate_frame *f) {

@@ -20,6 +20,15 @@ bst_imgproc_peak_law bst_peak_centroid_law_of(const bst_imgproc_worker *w,
 /* Sets a shape's path to the star streak at its position, from the camera motion. */
 void bst_peak_centroid_star_path(const bst_locate_frame *frame, bst_imgproc_shape *shape);
 
+/* Sets a shape's path to that of a point in a frame in which the camera moved unevenly: where stars
+ * are points the star's path, else bend and departure of the camera alone. Otherwise it stays. */
+void bst_peak_centroid_camera_path(const bst_locate_frame *frame, bst_imgproc_shape *shape);
+
+/* Moves a shape from the maximum of a filter to where the matched filter of its whole path has its
+ * own, within half a path, to a pixel. The filter of a point or a uniform streak may have its
+ * maximum where an uneven path dwells, far from its mean. A path within a pixel is left. */
+void bst_peak_centroid_on_path(const bst_locate_frame *frame, bst_imgproc_shape *shape);
+
 /* Sets the locator's error laws of points and of the star streak at the frame's centre.
  *
  * Notes:     A filter of the variance s^2 for images of t^2, of points: q = (s^2 + t^2)^2 / (4 s^2

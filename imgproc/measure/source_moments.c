@@ -5,12 +5,6 @@
 
 #include "imgproc/measure/cosmic_ray.h"
 
-/* Source is streak-like from this length, FWHM of the PSF: points with noise measure less, blends
- * of two and streaks of 2.5 sigma or more reach it. */
-static const double OWN_STREAK_LENGTH = 1.5;
-/* The fit as a streak must lower chi-square by this much: for two more parameters noise does so in
- * exp(-9 / 2) = 1 % of the points. */
-static const double LEAST_GAIN = 9.0;
 /* Largest change of the path's length per round, share: the three chi-squares of the parabola. */
 static const double MOST_STEP = 0.2;
 
@@ -79,7 +73,7 @@ void bst_source_moments_own_streak(const bst_imgproc_worker *w, int i, bst_imgpr
     double psf_fwhm = BST_FWHM_PER_SIGMA * w->l->profiles.sigma_px;
     for (int round = 0; round < 4; round++) {
         if (!bst_source_moments_measure(w, i, found, 2.0 * bst_deblend_reach(f)) ||
-            found->length_px < OWN_STREAK_LENGTH * psf_fwhm) {
+            found->length_px < BST_OWN_STREAK_LENGTH * psf_fwhm) {
             return;
         }
         double spread = (found->length_px * found->length_px - psf_fwhm * psf_fwhm) /
@@ -108,7 +102,7 @@ void bst_source_moments_own_streak(const bst_imgproc_worker *w, int i, bst_imgpr
             chi =
                 chi_square_of_path(w, i, found, &stamp, &before.source, path * (1.0 + step), angle);
         }
-        if (!(chi < old_chi - LEAST_GAIN)) {
+        if (!(chi < old_chi - BST_OWN_STREAK_GAIN)) {
             *found = before;
             return;
         }

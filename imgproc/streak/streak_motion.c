@@ -5,16 +5,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/measure/peak_centroid.h"
 #include "sim/core/cholesky.h"
 
 /* Least SNR of a streak used for the motion. */
 static const double LEAST_SNR = 20.0;
 /* Largest relative brightness of a neighbour that does not bias a streak. */
 static const double ALONE_SHARE = 0.02;
-static const double LEAST_PATH_SIGMAS = 4.0;
+static const double LEAST_PATH_SIGMAS = 4.0, LEAST_UNEVEN_SIGMAS = 2.0;
 /* Largest bend relative to the path length that can be treated as a correction to uniform motion.
  */
-static const double MOST_BEND = 0.1;
+static const double MOST_BEND = 0.5;
 /* A motion with a smaller correction needs no third round. */
 static const double SMALL_STEP_PX = 0.2;
 /* Rejection limit: chi-square, COMMON degrees of freedom, of a star's motion against the common
@@ -111,6 +112,10 @@ static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
     shape.dy_px /= f->binning;
     shape.bend_x_px /= f->binning;
     shape.bend_y_px /= f->binning;
+    shape.departure = f->departure;
+    if (f->uneven) {
+        bst_peak_centroid_on_path(f, &shape);
+    }
     *out = (star){.shape = shape,
                   .start_x = shape.x_px,
                   .start_y = shape.y_px,
@@ -247,14 +252,16 @@ static bool step_star(star *s, const double by[COMMON], double ex, double ey) {
            isfinite(s->flux_e) && isfinite(s->product_e);
 }
 
-/* Joint motion step of all stars and the priors; bend_px2: variance of the bend that is left. */
+/* Joint motion step of all stars and the priors, and the covariance that is left. */
 static bool solve_motion(const star *stars, int count, const double sigma[COMMON],
-                         const double away[COMMON], double step[COMMON], double *bend_px2) {
-    double a[LOCAL][LOCAL] = {{0}}, x[2][LOCAL] = {{0}, {[COMMON - 1] = 1.0}};
+                         const double away[COMMON], double step[COMMON],
+                         double covariance[COMMON][COMMON]) {
+    double a[LOCAL][LOCAL] = {{0}}, x[1 + COMMON][LOCAL] = {{0}};
     for (int k = 0; k < COMMON; k++) {
         double prior = 1.0 / (sigma[k] * sigma[k]);
         a[k][k] = prior;
         x[0][k] = -prior * away[k];
+        x[1 + k][k] = 1.0;
         for (int i = 0; i < count; i++) {
             if (stars[i].used) {
                 x[0][k] += stars[i].gradient[k];
@@ -264,13 +271,13 @@ static bool solve_motion(const star *stars, int count, const double sigma[COMMON
             }
         }
     }
-    if (!solve(COMMON, a, 2, x)) {
+    if (!solve(COMMON, a, 1 + COMMON, x)) {
         return false;
     }
     for (int k = 0; k < COMMON; k++) {
         step[k] = x[0][k];
+        memcpy(covariance[k], x[1 + k], sizeof covariance[k]);
     }
-    *bend_px2 = x[1][COMMON - 1];
     return isfinite(step[0]) && isfinite(step[1]) && isfinite(step[2]);
 }
 
@@ -308,7 +315,8 @@ bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *f)
     work->ey = dy / length;
     work->binning = f->binning;
     work->sigma_px = f->sigma_px;
-    return length >= LEAST_PATH_SIGMAS * f->sigma_px * f->binning &&
+    const double least = f->uneven ? LEAST_UNEVEN_SIGMAS : LEAST_PATH_SIGMAS;
+    return length >= least * f->sigma_px * f->binning &&
            hypot(bend_x, bend_y) <= MOST_BEND * length;
 }
 
@@ -343,19 +351,19 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *p
     const double least = 1e-4;
     const double sigma[COMMON] = {fmax(length_px, least), fmax(length_px, least),
                                   fmax(bend_px, least)};
-    double away[COMMON] = {0}, bend_px2 = 0.0;
+    double away[COMMON] = {0};
     for (int round = 0; round < ROUNDS; round++) {
         double step[COMMON] = {0};
         for (int i = 0; i < count; i++) {
             bst_source_profiles_on(profiles, stars[i].origin_x_px, stars[i].origin_y_px, (int)b);
             stars[i].used = stars[i].used && accumulate_star(work, psf, profiles, &stars[i]);
         }
-        if (!solve_motion(stars, count, sigma, away, step, &bend_px2)) {
+        if (!solve_motion(stars, count, sigma, away, step, work->covariance)) {
             return false;
         }
         if (round == ROUNDS - 2) {
             reject_outliers(stars, count, step);
-            if (!solve_motion(stars, count, sigma, away, step, &bend_px2)) {
+            if (!solve_motion(stars, count, sigma, away, step, work->covariance)) {
                 return false;
             }
         }
@@ -378,6 +386,10 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *p
     }
     bst_camera_motion_add(motion, camera, b * (away[0] * ex - away[1] * ey),
                           b * (away[0] * ey + away[1] * ex), b * away[2] * ex, b * away[2] * ey);
+    const double bend_px2 = work->covariance[COMMON - 1][COMMON - 1];
     motion->bend_sigma_rad = b * sqrt(bend_px2) * bst_camera_scale_rad(camera);
+    for (int k = 0; k < COMMON * COMMON; k++) {
+        work->covariance[k / COMMON][k % COMMON] *= b * b;
+    }
     return true;
 }

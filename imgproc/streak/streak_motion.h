@@ -17,6 +17,8 @@ typedef struct bst_streak_motion {
     struct bst_streak_motion_star *stars; /* [BST_STREAK_MOTION_STARS] */
     int count;
     double ex, ey, binning, sigma_px; /* direction of the path; sensor pixels per pixel; PSF */
+    /* of the latest solution: length, across and bend, sensor px^2 */
+    double covariance[BST_STREAK_MOTION_COUNT][BST_STREAK_MOTION_COUNT];
 } bst_streak_motion;
 
 /* Allocates the work space of the fit of the camera's motion.
@@ -39,8 +41,8 @@ void bst_streak_motion_free(bst_streak_motion *work);
  * bst_streak_motion_solve.
  *
  * Returned:  false if there is nothing to measure: stars are points, streaks are shorter than 4
- *            sigma of the PSF, or the path bends by more than a tenth of its length (the camera was
- *            starting or stopping) */
+ *            sigma of the PSF (2 where the camera starts or stops), or the path bends by more than
+ *            half of its length */
 bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *frame);
 /* Adds bright isolated streaks of the frame, or of a part of it, in order of their SNR. */
 void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *frame,
@@ -53,7 +55,8 @@ void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *fram
  *                       path, frame px
  *            bend_px    1 sigma prior of the error of its bend, frame px
  *            *motion    copy of frame->motion
- * Returned:  *motion    corrected; its bend_sigma_rad is that of the bend along the streaks
+ * Returned:  *motion    corrected; its bend_sigma_rad is that of the bend along the streaks, and
+ *                       work->covariance that of all three
  *            false, with *motion unchanged, if no streak was bright enough */
 bool bst_streak_motion_solve(bst_streak_motion *work, const bst_imgproc_gauss *psf,
                              bst_source_profiles *profiles, const bst_camera *camera,

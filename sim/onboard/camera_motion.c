@@ -1,5 +1,8 @@
 #include "boresight/camera_motion.h"
 
+#include <assert.h>
+#include <string.h>
+
 static const bst_pointing_sample *sample_at(const bst_pointing_telemetry *t, int64_t n) {
     return &t->items[n % t->capacity];
 }
@@ -52,19 +55,67 @@ static void add_sample(roughness *s, double step, bst_vec3 r) {
     s->run++;
 }
 
+/* Rotations at the knots of a departure. */
+typedef struct knots {
+    int count; /* those that are known */
+    bst_vec3 r[BST_CAMERA_MOTION_KNOTS];
+} knots;
+
+/* A linear piece of the rotation from t = ta to tb. */
+typedef struct piece {
+    double ta, tb;
+    bst_vec3 ra, rb;
+} piece;
+
+/* Adds the knots up to t = end on a piece. */
+static void add_knots(knots *k, double half, const piece *p, double end) {
+    for (; k->count < BST_CAMERA_MOTION_KNOTS; k->count++) {
+        double t = half * (2.0 * k->count / (BST_CAMERA_MOTION_KNOTS - 1) - 1.0);
+        if (t > end) {
+            break;
+        }
+        k->r[k->count] = lerp(p->ra, p->rb, (t - p->ta) / (p->tb - p->ta));
+    }
+}
+
 /* minimum number of third differences for a noise estimate */
 enum { FEWEST_DIFFERENCES = 5 };
 
 /* Share of the noise's variance that is left of a bend where none is measured. */
 #define LEAST_UNKNOWN (1.0 / 3.0)
 
+/* A smaller mean square of the departure, in that of its noise, is taken for noise. */
+static const double LEAST_DEPARTURE = 4.0;
+
+/* Sets the departure from mean, turn and bend, shrunk by its noise of `variance` per axis. */
+static void set_departure(const knots *k, bst_vec3 mean, double variance, bst_camera_motion *out) {
+    const int last = BST_CAMERA_MOTION_KNOTS - 1;
+    double square = 0.0;
+    for (int i = 0; i <= last && k->count > last; i++) {
+        const double u = 2.0 * i / last - 1.0;
+        bst_vec3 left = bst_vec3_axpy(bst_vec3_sub(k->r[i], mean), -0.5 * u, out->turn_cam_rad);
+        left = bst_vec3_axpy(left, 0.5 - 1.5 * u * u, out->bend_cam_rad);
+        out->departure_cam_rad[0][i] = left.x;
+        out->departure_cam_rad[1][i] = left.y;
+        square += (i % last ? 1.0 : 0.5) / last * (left.x * left.x + left.y * left.y);
+    }
+    const double noise = 2.0 * variance;
+    const double share = square > LEAST_DEPARTURE * noise ? 1.0 - noise / square : 0.0;
+    for (int i = 0; i <= last; i++) {
+        out->departure_cam_rad[0][i] *= share;
+        out->departure_cam_rad[1][i] *= share;
+    }
+}
+
+/* Variance of the telemetry's noise per sample and axis. */
+static double noise_variance(const roughness *s) {
+    return s->sum / (2.0 * s->count * 20.0);
+}
+
 /* Shrinks the estimated curvature of the motion by its noise. */
 static void judge_bend(const roughness *s, double samples, bst_camera_motion *motion) {
-    if (s->count < FEWEST_DIFFERENCES) {
-        return;
-    }
     /* least-squares coefficient of a second-degree Legendre polynomial */
-    double variance = s->sum / (2.0 * s->count * 20.0) * 5.0 / samples;
+    double variance = noise_variance(s) * 5.0 / samples;
     bst_vec3 b = motion->bend_cam_rad;
     double square = b.x * b.x + b.y * b.y;
     double share = square > 2.0 * variance ? 1.0 - 2.0 * variance / square : 0.0;
@@ -95,6 +146,7 @@ bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, i
     moments m = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     bst_vec3 at_middle = {0, 0, 0};
     roughness noise = {.run = 0};
+    knots path = {.count = 0};
     bst_vec3 rb = {0, 0, 0};
     int64_t known = -1; /* sample to which rb belongs */
     for (int64_t n = first; n < newest; n++) {
@@ -120,6 +172,9 @@ bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, i
         if (hi > lo) {
             add_segment(&m, lo, hi, lerp(ra, rb, (lo - ta) / (tb - ta)),
                         lerp(ra, rb, (hi - ta) / (tb - ta)));
+            /* the last knot is at the end but for rounding */
+            bool last = n + 1 == newest || tb >= half;
+            add_knots(&path, half, &(piece){ta, tb, ra, rb}, last ? INFINITY : hi);
         }
         if (tb >= half) {
             break;
@@ -139,7 +194,11 @@ bool bst_camera_motion_from_telemetry(const bst_pointing_telemetry *telemetry, i
     out->turn_cam_rad = turn;
     out->bend_cam_rad = bend;
     out->bend_sigma_rad = 0.0;
-    judge_bend(&noise, 2.0 * half / fmax(noise.step, 1.0), out);
+    memset(out->departure_cam_rad, 0, sizeof out->departure_cam_rad);
+    if (noise.count >= FEWEST_DIFFERENCES) {
+        set_departure(&path, mean, noise_variance(&noise), out);
+        judge_bend(&noise, 2.0 * half / fmax(noise.step, 1.0), out);
+    }
     return true;
 }
 
@@ -161,6 +220,16 @@ void bst_camera_motion_bend(const bst_camera_motion *motion, const bst_camera *c
     double scale = bst_camera_scale_rad(camera), k[2][2];
     bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);
     double a = motion->bend_cam_rad.y, b = -motion->bend_cam_rad.x;
+    *x_px = (k[0][0] * a + k[0][1] * b) / scale;
+    *y_px = (k[1][0] * a + k[1][1] * b) / scale;
+}
+
+void bst_camera_motion_departure(const bst_camera_motion *motion, const bst_camera *camera,
+                                 int knot, double *x_px, double *y_px) {
+    assert(knot >= 0 && knot < BST_CAMERA_MOTION_KNOTS);
+    double scale = bst_camera_scale_rad(camera), k[2][2];
+    bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);
+    double a = motion->departure_cam_rad[1][knot], b = -motion->departure_cam_rad[0][knot];
     *x_px = (k[0][0] * a + k[0][1] * b) / scale;
     *y_px = (k[1][0] * a + k[1][1] * b) / scale;
 }

@@ -237,7 +237,7 @@ static void charge(void **state) {
                                           .length_px = 3,
                                           .width_px = 1,
                                           .angle_rad = 0.5}};
-    found.source.shape = (bst_imgproc_shape){1, 2, 3, 4, 5, 6, 0.9};
+    found.source.shape = (bst_imgproc_shape){1, 2, 3, 4, 5, 6, 0.9, NULL};
     bst_cosmic_ray_take(&found);
     /* a normal tail of 4 sigma, with one in e^7 */
     bst_assert_close(found.label_probability, exp(1) / (1 + exp(1)), 1e-12);

@@ -54,7 +54,7 @@ static void rules_integrate_polynomials(void **state) {
 static void point_is_product_of_erfs(void **state) {
     fixture *f = *state;
     for (int k = 0; k < 20; k++) {
-        bst_imgproc_shape s = {33.0 + 0.05 * k, 43.0 + 0.037 * k, 0, 0, 0, 0, 0.6 + 0.1 * k};
+        bst_imgproc_shape s = {33.0 + 0.05 * k, 43.0 + 0.037 * k, 0, 0, 0, 0, 0.6 + 0.1 * k, NULL};
         bst_imgproc_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
         for (int i = 0; i < PIXELS; i++) {
             double px = share_of(stamp.x0 + i % SIDE, s.x_px, s.sigma_px);
@@ -71,7 +71,7 @@ static void streak_is_the_line_integral(void **state) {
                                       {0.2, -20, 0, 0}, {22, 13, 0, 0}, {8, 0, 1.3, 0.4}};
     for (size_t c = 0; c < sizeof paths / sizeof *paths; c++) {
         bst_imgproc_shape s = {33.3,        44.1,        paths[c][0], paths[c][1],
-                               paths[c][2], paths[c][3], 0.85};
+                               paths[c][2], paths[c][3], 0.85,        NULL};
         bst_imgproc_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
         memset(f->other, 0, sizeof f->other);
         enum { STEPS = 20000 };
@@ -106,7 +106,7 @@ static void streak_is_the_line_integral(void **state) {
 /* Derivatives against central differences: h^2 f''' / 6 is below 1e-6 at h = 1e-3. */
 static void derivatives_are_slopes(void **state) {
     fixture *f = *state;
-    bst_imgproc_shape s = {33.3, 44.1, 4.0, -3.0, 0.5, 0.2, 0.85};
+    bst_imgproc_shape s = {33.3, 44.1, 4.0, -3.0, 0.5, 0.2, 0.85, NULL};
     bst_imgproc_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
     const double h = 1e-3;
     for (int which = 0; which < 3; which++) {
@@ -139,7 +139,7 @@ static void stamps_may_cut_the_source(void **state) {
     static const double centres[][2] = {
         {-500, 30}, {9.6, 19.6}, {57.9, 68.2}, {1e6, -1e6}, {30, 90}};
     for (size_t c = 0; c < sizeof centres / sizeof *centres; c++) {
-        bst_imgproc_shape s = {centres[c][0], centres[c][1], 30, 40, 1, -2, 1.3};
+        bst_imgproc_shape s = {centres[c][0], centres[c][1], 30, 40, 1, -2, 1.3, NULL};
         bst_imgproc_gauss_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);
         double sum = 0.0;
         for (int i = 0; i < PIXELS; i++) {

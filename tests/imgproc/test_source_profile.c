@@ -71,7 +71,8 @@ static void agrees_with_double_precision(void **state) {
                                    paths[c][1],
                                    paths[c][2],
                                    paths[c][3],
-                                   sigmas[k]};
+                                   sigmas[k],
+                                   NULL};
             bst_imgproc_stamp stamp = {100, 115, SIDE, 84};
             compare(*state, &s, &stamp);
         }
@@ -83,12 +84,12 @@ static void stamps_may_cut_the_source(void **state) {
     static const bst_imgproc_stamp stamps[] = {{40, 50, 9, 9},   {47, 50, 3, 14}, {50, 44, 16, 17},
                                                {53, 57, 33, 20}, {0, 0, 20, 20},  {51, 53, 1, 1}};
     for (size_t c = 0; c < sizeof stamps / sizeof *stamps; c++) {
-        bst_imgproc_shape point = {50.3, 52.8, 0, 0, 0, 0, 0.85},
-                          streak = {50.3, 52.8, 6, -9, 0, 0, 0.85};
+        bst_imgproc_shape point = {50.3, 52.8, 0, 0, 0, 0, 0.85, NULL},
+                          streak = {50.3, 52.8, 6, -9, 0, 0, 0.85, NULL};
         compare(*state, &point, &stamps[c]);
         compare(*state, &streak, &stamps[c]);
     }
-    bst_imgproc_shape far = {1e9, -1e9, 3, 4, 0, 0, 0.85};
+    bst_imgproc_shape far = {1e9, -1e9, 3, 4, 0, 0, 0.85, NULL};
     compare(*state, &far, &stamps[0]);
 }
 

@@ -163,6 +163,9 @@ static void noise_is_no_bend(void **state) {
             }
             bst_camera_motion m;
             assert_true(bst_camera_motion_from_telemetry(t, 300, 3300, &m));
+            for (int k = 0; k < BST_CAMERA_MOTION_KNOTS; k++) { /* nor is it a departure */
+                assert_true(m.departure_cam_rad[0][k] == 0.0 && m.departure_cam_rad[1][k] == 0.0);
+            }
             error2 += pow(m.bend_cam_rad.x - true_bend, 2) + pow(m.bend_cam_rad.y, 2);
             stated2 += 2.0 * m.bend_sigma_rad * m.bend_sigma_rad;
             free(t);
@@ -181,6 +184,77 @@ static void noise_is_no_bend(void **state) {
              * 1/3 for s < 3, is 0.382 */
             bst_assert_close(stated2, 0.382, 0.03);
         }
+    }
+}
+
+/* A camera that settles, r = a exp(-k t) about y, t from 0 to 1 over the exposure: the departure is
+ * r less its Legendre coefficients of degrees 0 to 2, here by the midpoint rule. Chords between 100
+ * samples and their sums err by a (k / 100)^2 / 8 and less. */
+static void settling_departs_from_a_bend(void **state) {
+    (void)state;
+    enum { STEPS = 20000 };
+    const double a = 2e-4, k = 8.0;
+    bst_pointing_telemetry *t = telemetry(60, 100, (bst_vec3){0, 0, 0});
+    for (int n = 0; n < 60; n++) {
+        const double at = (n - 5) / 50.0;
+        t->items[n].q_cam_from_gcrf = bst_quat_from_rotvec((bst_vec3){0, a * exp(-k * at), 0});
+    }
+    bst_camera_motion m;
+    assert_true(bst_camera_motion_from_telemetry(t, 500, 5500, &m));
+    double c[3] = {0.0};
+    for (int n = 0; n < STEPS; n++) {
+        const double at = (n + 0.5) / STEPS, u = 2.0 * at - 1.0, r = a * exp(-k * at) / STEPS;
+        c[0] += r;
+        c[1] += 3.0 * r * u;
+        c[2] += 5.0 * r * (1.5 * u * u - 0.5);
+    }
+    const double limit = a * (k / 50.0) * (k / 50.0) / 8.0 * 2.0;
+    for (int n = 0; n < BST_CAMERA_MOTION_KNOTS; n++) {
+        const double at = (double)n / (BST_CAMERA_MOTION_KNOTS - 1), u = 2.0 * at - 1.0;
+        const double left = a * exp(-k * at) - c[0] - c[1] * u - c[2] * (1.5 * u * u - 0.5);
+        bst_assert_close(m.departure_cam_rad[1][n], left, limit);
+        bst_assert_close(m.departure_cam_rad[0][n], 0.0, 1e-12);
+    }
+    /* a star goes to +x when the camera turns about +y: a / scale px, at 1 px of 1e-5 rad */
+    bst_camera camera = {.width_px = 64, .height_px = 64, .pixel_scale_arcsec = 2.0626480624709636};
+    double x, y;
+    bst_camera_motion_departure(&m, &camera, 0, &x, &y);
+    bst_assert_close(x, m.departure_cam_rad[1][0] / 1e-5, 1e-6);
+    bst_assert_close(y, 0.0, 1e-9);
+    assert_true(x > 3.0);
+    assert_true(bst_camera_motion_is_uneven(&m, &camera, 0.85));
+    assert_false(bst_camera_motion_is_uneven(&m, &camera, 40.0));
+    free(t);
+}
+
+/* Of uniform paths the displacement is that of bst_camera_motion_shared_shift, an integral of its
+ * own along one axis. 1 %: its formula takes the ends alone, 64 steps here. */
+static void uniform_paths_shift_alike(void **state) {
+    (void)state;
+    static const double lengths[] = {2.5, 5.5, 8.4, 14.0};
+    for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
+        double path[BST_CAMERA_MOTION_KNOTS][2], shared[3], along, across;
+        const double c = 0.6, s = 0.8;
+        for (int k = 0; k < BST_CAMERA_MOTION_KNOTS; k++) {
+            const double at = lengths[i] * ((double)k / (BST_CAMERA_MOTION_KNOTS - 1) - 0.5);
+            path[k][0] = c * at;
+            path[k][1] = s * at;
+        }
+        const bst_camera_motion_unknown unknown = {.bend_px = 0.3, .drift_px = 1.0};
+        bst_camera_motion_uneven_shift(path, 0.9, &unknown, shared);
+        bst_camera_motion_shared_shift(lengths[i], 0.9, 0.3, 0.3, &along, &across);
+        const double found = c * c * shared[0] + 2.0 * c * s * shared[1] + s * s * shared[2];
+        const double side = s * s * shared[0] - 2.0 * c * s * shared[1] + c * c * shared[2];
+        bst_assert_close(found / along, 1.0, 0.01);
+        bst_assert_close(side / across, 1.0, 0.01);
+        /* what is measured of the bend counts as stated, and length and direction do not matter */
+        const double covariance[3][3] = {{0.04, 0.0, 0.0}, {0.0, 0.04, 0.0}, {0.0, 0.0, 1e-4}};
+        const bst_camera_motion_unknown left = {
+            .bend_px = 0.3, .covariance = covariance, .ex = c, .ey = s};
+        bst_camera_motion_uneven_shift(path, 0.9, &left, shared);
+        bst_camera_motion_shared_shift(lengths[i], 0.9, 0.3, 0.01, &along, &across);
+        const double less = c * c * shared[0] + 2.0 * c * s * shared[1] + s * s * shared[2];
+        bst_assert_close(less / along, 1.0, 0.01);
     }
 }
 
@@ -270,6 +344,8 @@ int main(void) {
         cmocka_unit_test(few_samples),
         cmocka_unit_test(streak_is_the_stars_path),
         cmocka_unit_test(streaks_share_what_is_not_known_of_the_motion),
+        cmocka_unit_test(settling_departs_from_a_bend),
+        cmocka_unit_test(uniform_paths_shift_alike),
         cmocka_unit_test(places_are_as_wrong_as_the_bend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
