@@ -52,6 +52,7 @@ static void destroy(void *self) {
     bst_psf_wings_free(m->wings);
     bst_plugin_detector_free(m->plugin);
     bst_imgproc_lost_close(&m->lost);
+    bst_extended_step_close(&m->extended);
     free(m);
 }
 
@@ -156,12 +157,8 @@ static bst_status prepare(const bst_module_env *env, bst_imgproc_state *m) {
                         "imgproc: track_windows and stack do not go together: stacks are made of "
                         "whole frames; turn one of them off");
     }
-    m->extended.config = &m->config->extended;
-    if (m->config->extended.enabled && (m->config->stack.frames > 0 || m->config->track_windows)) {
-        return bst_fail(env->ctx, BST_ERR_CONFIG,
-                        "imgproc: extended goes neither with track_windows nor with stack; turn "
-                        "them off");
-    }
+    BST_TRY(bst_extended_step_open(env->ctx, &m->extended, &m->config->extended,
+                                   m->config->stack.frames == 0 && !m->config->track_windows));
     if (m->config->stack.frames > 0) {
         BST_TRY(bst_stack_create(env->ctx, &m->camera, &m->config->stack, (int)m->config->threads,
                                  &m->stack));
@@ -437,8 +434,9 @@ static bst_status detect_frame(bst_imgproc_state *m, struct bst_step *step, bst_
     if (!m->plugin) {
         m->window_v_limit = bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR);
         const bst_extended_input input = {
-            &m->calibrator.camera,     message,        bst_imgproc_silhouettes(l->ip),
-            e->motion && e->navigated, e->light.sun_m, out->q_cam_from_gcrf};
+            &m->calibrator.camera,           message,        bst_imgproc_silhouettes(l->ip),
+            e->motion && e->navigated,       e->light.sun_m, out->q_cam_from_gcrf,
+            middle / (double)m->tick_rate_hz};
         bst_extended_step_begin(&m->extended, &input, out);
     }
     return BST_OK;

@@ -23,5 +23,11 @@ const bst_config_desc bst_extended_config_table[] = {
              "Largest extent of the target as known on board, for its range; 0: unknown."),
     BST_REAL(C, target_size_sigma_m, "m", 0, 1000, "0",
              "Its standard deviation, what a foreshortened view changes included."),
+    BST_PATH(C, target_model, "\"\"",
+             "Model of the target on board, for its centre of mass and range: JSON with the keys "
+             "of shape, or a mesh (OBJ, glTF, GLB), relative to the scenario's folder; empty: "
+             "none, the outline alone."),
+    BST_REAL(C, target_model_sigma, "", 0.0001, 0.1, "0.002",
+             "Standard deviation of the model's dimensions, share of the size."),
     BST_CONFIG_END,
 };

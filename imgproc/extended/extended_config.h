@@ -12,6 +12,8 @@ typedef struct bst_extended_config {
     double phase_offset_factor; /* offset of the outline towards the Sun, 1: of a sphere */
     double centre_sigma;        /* of the estimated centre of mass, share of the size */
     double target_size_m, target_size_sigma_m; /* onboard knowledge; 0: unknown */
+    char target_model[512];                    /* file of a model on board; "": none */
+    double target_model_sigma;                 /* of its dimensions, share of the size */
 } bst_extended_config;
 
 extern const bst_config_desc bst_extended_config_table[];

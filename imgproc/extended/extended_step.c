@@ -9,6 +9,29 @@
  * tracker refuse the place when the panels came back. */
 static const double SIZE_KEPT = 0.95;
 
+bst_status bst_extended_step_open(bst_ctx *ctx, bst_extended_step *step,
+                                  const bst_extended_config *config, bool whole) {
+    assert(step && config);
+    step->config = config;
+    if (config->enabled && !whole) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "imgproc: extended goes neither with track_windows nor with stack; turn "
+                        "them off");
+    }
+    if (!config->enabled || config->target_model[0] == '\0') {
+        return BST_OK;
+    }
+    bst_status status = bst_target_model_load(ctx, config->target_model, &step->fit.model);
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(ctx, status, "imgproc/extended/target_model");
+}
+
+void bst_extended_step_close(bst_extended_step *step) {
+    assert(step);
+    bst_target_model_free(step->fit.model);
+    step->fit.model = NULL;
+}
+
 void bst_extended_step_begin(bst_extended_step *step, const bst_extended_input *input,
                              bst_detections *out) {
     assert(step && step->config && input && input->message && out);
@@ -22,6 +45,8 @@ void bst_extended_step_begin(bst_extended_step *step, const bst_extended_input *
                                      .origin_y_px = m->window.y0 + 0.5 * (m->binning - 1),
                                      .binning = m->binning,
                                      .sun_known = input->sun_known};
+    step->q_cam_from_gcrf = input->q_cam_from_gcrf;
+    step->middle_s = input->middle_s;
     if (input->sun_known) {
         step->view.sun_cam = bst_quat_rotate(input->q_cam_from_gcrf, bst_vec3_unit(input->sun_m));
     }
@@ -67,6 +92,11 @@ void bst_extended_step_append(bst_extended_step *step, double exposure_s,
         double size = i == 0 ? SIZE_KEPT * step->handover.size_px : 0.0;
         bst_extended_measure(step->config, &step->view, &step->targets.items[i], size, d);
         step->handover.size_px = i == 0 ? fmax(size, d->extent.size_px) : step->handover.size_px;
+        if (i == 0 && step->fit.model) {
+            const bst_target_fit_frame frame = {&step->view, step->q_cam_from_gcrf, step->middle_s,
+                                                exposure_s};
+            bst_target_fit_measure(&step->fit, step->config, &frame, &step->targets.items[i], d);
+        }
         double one_e_per_s = bst_camera_electrons_per_s(step->view.camera, 0.0);
         d->v_mag = -2.5 * log10(d->flux_e / fmax(exposure_s, 1e-9) / one_e_per_s);
         bst_photometry_correct(zero_point, d);
@@ -76,4 +106,5 @@ void bst_extended_step_append(bst_extended_step *step, double exposure_s,
 void bst_extended_step_archive(bst_extended_step *step, bst_archive *archive) {
     bst_archive_bool(archive, &step->handover.extended);
     BST_ARCHIVE(archive, step->handover.size_px);
+    bst_target_fit_archive(&step->fit, archive);
 }

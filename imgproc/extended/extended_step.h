@@ -5,6 +5,7 @@
 #include "boresight/archive.h"
 #include "boresight/messages.h"
 #include "imgproc/extended/handover.h"
+#include "imgproc/extended/target_fit.h"
 #include "sim/optics/photometry.h"
 
 /* State between frames, and targets of the current frame. */
@@ -12,6 +13,9 @@ typedef struct bst_extended_step {
     const bst_extended_config *config;
     bst_handover handover;
     bst_extended_view view;
+    bst_quat q_cam_from_gcrf;
+    double middle_s;                 /* middle of the exposure */
+    bst_target_model_fit fit;        /* of the largest target, with config->target_model */
     bst_silhouettes targets, points; /* extended ones, and small ones that stay points */
 } bst_extended_step;
 
@@ -23,14 +27,28 @@ typedef struct bst_extended_input {
     bool sun_known;
     bst_vec3 sun_m; /* observer to Sun, GCRF */
     bst_quat q_cam_from_gcrf;
+    double middle_s; /* middle of the exposure */
 } bst_extended_input;
+
+/* Opens the step: reads config->target_model, if there is one.
+ *
+ * Given:     config  outlives the step
+ *            whole   frames are processed one by one and as a whole
+ * Errors:    BST_ERR_CONFIG if extended targets are wanted without that; those of
+ *            bst_target_model_load
+ * Ownership: free with bst_extended_step_close, also after an error */
+bst_status bst_extended_step_open(bst_ctx *ctx, bst_extended_step *step,
+                                  const bst_extended_config *config, bool whole) BST_MUST_CHECK;
+/* Frees the model; the struct belongs to the caller. */
+void bst_extended_step_close(bst_extended_step *step);
 
 /* Selects the extended targets (bst_handover_select). Call it before stars are identified. Without
  * config->enabled it does nothing. */
 void bst_extended_step_begin(bst_extended_step *step, const bst_extended_input *input,
                              bst_detections *out);
 
-/* Appends a detection for each selected target; of a full message the last detection is lost.
+/* Appends a detection for each selected target; of a full message the last detection is lost. With
+ * a model on board the largest one has the place that follows from it (bst_target_fit_measure).
  * Objects that are almost large enough are moved by the offset of their centroid of light, so that
  * the position is continuous (bst_extended_correct_point).
  *

@@ -423,6 +423,7 @@ static void measure(bst_silhouette_finder *s, const bst_silhouette_frame *f, dou
     out->edge = box->x0 <= 0 || box->y0 <= 0 || box->x1 >= f->width - 1 || box->y1 >= f->height - 1;
     least_signals least = {signal_of(EDGE_SNR, noise), signal_of(PART_SNR, noise),
                            signal_of(NEIGHBOUR_SNR, noise)};
+    out->least_e = least.part_e;
     make_outline(s, edges, box, &least, noise, &out->outline);
     if (out->outline.count < 3) { /* all of it is dim */
         least = (least_signals){noise, noise, noise};

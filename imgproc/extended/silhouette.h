@@ -20,6 +20,7 @@ typedef struct bst_silhouette {
     double x_px, y_px;             /* centroid of that area */
     double light_x_px, light_y_px; /* centroid of light */
     double flux_e, flux_variance;
+    double least_e;        /* signal of a pixel from which a part of its own has edges */
     double moment_size_px; /* size by the second moments of the light, less PSF and star streak */
     double length_px, width_px, angle_rad; /* extents of the outline */
     double x0_px, y0_px, x1_px, y1_px;     /* bounding box of the outline */

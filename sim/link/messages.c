@@ -283,7 +283,7 @@ static const bst_wire_field detection_items[] = {
     BOUNDED(bst_detection, extent.phase_rad, 0, 3.1416, "rad",
             "Sun - target - observer, by the onboard Sun."),
     BOUNDED(bst_detection, extent.saturated_share, 0, 1, "", "Of the area, that is saturated."),
-    BOUNDED(bst_detection, extent.range_m, 0, 1e15, "m", "From the known size; 0: not known."),
+    BOUNDED(bst_detection, extent.range_m, 0, 1e15, "m", "From the known size or model; 0: not known."),
     BOUNDED(bst_detection, extent.range_sigma_m, 0, 1e15, "m", "1 sigma of it."),
     END};
 

@@ -2,10 +2,11 @@
 """Closed loop around a tumbling satellite: image processing hands over from a point to a silhouette, its centre of mass is
 estimated to 3 % of the apparent size, and the track is never lost.
 
-    test_inspection.py build/boresight          the approach from 1.5 km to 0.2 km, one seed
-    test_inspection.py build/boresight 20       from 300 m to 27 m with 20 seeds and attitudes of the target, and
-                                                scenarios/inspection.json as shipped and with another
-                                                attitude (./dev slow)
+    test_inspection.py build/boresight          the approach from 1.5 km to 0.2 km, one seed; from 300 m with a model of the
+                                                target on board
+    test_inspection.py build/boresight 20       from 300 m to 27 m with 20 seeds and attitudes of the target, without and
+                                                with a model on board, and scenarios/inspection.json as shipped, with
+                                                another attitude, and with both (./dev slow)
 """
 import json
 import os
@@ -29,6 +30,10 @@ LAST = {**NEAR, "/observers/0/orbit/offset_rtn_m": [0, -300, 0],
         "/observers/0/burns": [{"time_s": 20, "dv_rtn_mps": [0, 0.99, 0]}],
         "/observers/0/sensors/0/exposure/exposure_s": 1e-4,
         "/observers/0/sensors/0/modules/control/exposure_schedule": [{"time_s": 150, "exposure_s": 5e-5}]}
+
+
+# image processing knows the target, as in scenarios/inspection_client.json
+MODEL = {"/observers/0/sensors/0/modules/imgproc/extended/target_model": "satellites/inspection_client.json"}
 
 
 def run(program, folder, seed, changes):
@@ -70,11 +75,20 @@ def judge(folder):
             "targets": len(targets), "frames": len(tracked)}
 
 
+def normalised(folder):
+    """Mean square of the errors of the place over their standard deviations, for one component; with right covariances 1."""
+    found = rows(folder, "SELECT d.x_px - s.x_px, d.y_px - s.y_px, d.cov_xx_px2, d.cov_xy_px2, d.cov_yy_px2 FROM shapes s"
+                         " JOIN extended_targets e USING (sensor, exposure_id)"
+                         " JOIN detections d ON d.sensor = e.sensor AND d.exposure_id = e.exposure_id AND d.item = e.item")
+    x, y, xx, xy, yy = np.array(found, dtype=float).T
+    return float(np.mean((yy * x**2 - 2.0 * xy * x * y + xx * y**2) / (xx * yy - xy**2)) / 2.0)
+
+
 def figures(result):
     e = result["error"]
     return {"frames": result["frames"], "extended": len(e), "rms_%": round(100 * float(np.sqrt(np.mean(e**2))), 2),
             "median_%": round(100 * float(np.median(e)), 2), "p95_%": round(100 * float(np.percentile(e, 95)), 2),
-            "max_%": round(100 * float(e.max()), 2), "largest_px": round(float(result["size"].max())),
+            "max_%": round(100 * float(e.max()), 2), "above_3_%": int(np.count_nonzero(e > 0.03)), "largest_px": round(float(result["size"].max())),
             "first": result["first"], "lost": result["lost"], "tracks": result["targets"], "several": result["several"]}
 
 
@@ -230,7 +244,10 @@ def main():
     cases = [(seed, {**LAST, **tumbling(seed)}, 90, 100) for seed in range(1, seeds + 1)]
     # with the attitude of seed 101 the panels reflect nothing in four frames at 380 px
     cases += [(1, {}, 400, 390), (101, tumbling(101), 400, 390)] if seeds else [(1, NEAR, 30, 40)]
-    errors = []
+    known = [(seed, {**changes, **MODEL}, frames, size_px) for seed, changes, frames, size_px in cases]
+    # without a model 9 of its 100 frames are above 3 %
+    cases += known if seeds else [(206, {**LAST, **tumbling(206), **MODEL}, 90, 100)]
+    errors, errors_known = [], []
     with tempfile.TemporaryDirectory() as folder:
         if not seeds:
             labels(program, folder)
@@ -240,7 +257,12 @@ def main():
             result = judge(out)
             shown = figures(result)
             print(json.dumps({"seed": seed, **shown}), flush=True)
-            errors.append(result["error"])
+            with_model = MODEL.items() <= changes.items()
+            (errors_known if with_model else errors).append(result["error"])
+            if with_model:
+                # measured: 0.4 to 1.1 % and up to 3.5 % of the frames (docs/results/closed_loop.md); the largest twice
+                assert shown["rms_%"] <= 2.0 and shown["above_3_%"] <= 0.07 * shown["extended"], "fit of the model"
+                assert 0.05 < normalised(out) < 2.0, "covariance of the fit"
             assert shown["lost"] == 0 and shown["tracks"] == 1, "the target was lost"
             assert shown["several"] == 0 and shown["rms_%"] <= 3.0, "centre of mass"
             assert shown["extended"] > frames and shown["first"] < 10 and shown["largest_px"] > size_px
@@ -251,9 +273,11 @@ def main():
             square = np.mean(result["range_deviation"]**2)
             assert frames < 400 or 0.4 < square < 3.0, f"range from the size: mean square {square:.2f}"
             subprocess.run(["rm", "-r", out], check=True)
-    e = np.concatenate(errors)
-    print(f"centre of mass: {100 * np.sqrt(np.mean(e**2)):.2f} % of the apparent size (RMS), "
-          f"{100 * np.percentile(e, 95):.2f} % (95th percentile), {len(errors)} runs, {len(e)} frames")
+    for name, found in (("outline", errors), ("model on board", errors_known)):
+        e = np.concatenate(found)
+        print(f"centre of mass, {name}: {100 * np.sqrt(np.mean(e**2)):.2f} % of the apparent size (RMS), "
+              f"{100 * np.percentile(e, 95):.2f} % (95th percentile), {np.count_nonzero(e > 0.03)} of {len(e)} frames above "
+              f"3 %, {len(found)} runs")
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ endforeach()
 foreach(folder imgproc tracker control)
   set(may_${folder} ${folder} ${onboard})
 endforeach()
+list(APPEND may_imgproc sim/satellite) # the model of a target on board
 list(APPEND may_sim/studies sim/eval) # intervals and theory
 set(may_sim/registry sim/registry sim/engine sim/link ${onboard} ${subsystems})
 set(may_sim/api sim/api sim/registry sim/engine sim/link sim/world sim/core)

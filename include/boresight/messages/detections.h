@@ -37,7 +37,7 @@ typedef struct bst_detection_extent {
     double area_px2;                   /* of the silhouette, dark holes filled */
     double phase_rad;                  /* Sun - target - observer, by the onboard Sun */
     double saturated_share;            /* share of the area that is saturated */
-    double range_m, range_sigma_m;     /* from the known size; 0: size unknown */
+    double range_m, range_sigma_m;     /* from the known size or model; 0: unknown */
 } bst_detection_extent;
 
 typedef struct bst_detection {

@@ -407,7 +407,7 @@ static const bst_io_column extended_columns[] = {
     REAL("area_px2", "px^2", "of the silhouette, dark holes filled"),
     REAL("saturated_share", "", "share of the area that is saturated"),
     REAL("phase_deg", "deg", "Sun - target - observer, by the onboard Sun"),
-    REAL("range_m", "m", "from the known size; NULL: unknown"),
+    REAL("range_m", "m", "from the known size or model; NULL: unknown"),
     REAL("range_sigma_m", "m", "its standard deviation"),
 };
 
