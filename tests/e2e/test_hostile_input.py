@@ -94,6 +94,8 @@ FILES = [
 T, RUN, OUT, F = runs.TRACK, "{run}", "{folder}/none", "{folder}"
 SPAN = ("propagate", "--tle", ELEMENTS, "--start", "2022-06-16T00:00:00Z", "--stop",
         "2022-06-17T00:00:00Z")
+SHAPE = ("--satellite", "scenarios/satellites/gps_iif.json", "--elements", ELEMENTS, "--norad", "39089", "--start",
+         "2022-06-16T02:00:00Z")
 STUDY = ("study", "{folder}/study.json")
 # words, exit code, what the message says
 LINES = [
@@ -191,8 +193,20 @@ LINES = [
     (("loop", T, "--sensor", "nix"), 1, r"--sensor nix: .*track.json has no such sensor \(allowed: neossat/tel"),
     (("lightcurve", T, "--object", "nix"), 1, "--object nix: the scenario has no such object"),
     (("lightcurve", T, "--step", "0"), 2, "--step 0: give a number from"),
+    *((("lightcurve", T, "--" + name, *value), 2, f"--{name} has no effect without --satellite")
+      for name, *value in (("elements", ELEMENTS), ("norad", "5"), ("observer-norad", "5"), ("attitude", "sun"),
+                           ("earthshine",))),
+    (("lightcurve", T, "--extinction", "1"), 2, "--extinction has no effect without --site"),
+    (("lightcurve", T, "--site", "1,1,1", "--observer", "neossat"), 2, "--site and --observer exclude each other"),
+    *((("lightcurve", *SHAPE, *words), 2, says) for words, says in (
+        (("--observer-norad", "44801", "--extinction", "1"), "--extinction has no effect without --site"),
+        (("--observer-norad", "44801", "--site", "1,1,1"), "--site and --observer-norad exclude each other"),
+        (("--site", "1,1,1", "--object", "x"), "--object is for a scenario, and --satellite was given"),
+        (("--site", "1,1,1", "--observer", "x"), "--observer is for a scenario"),
+        (("--site", "1,1,1", "--set", "/seed=3"), "--set is for a scenario"))),
     (("turntable", T + "/x"), 1, "x: "),
     (("turntable", "scenarios/satellites/gps_iif.json", "--size-px", "0"), 2, "--size-px 0: give an integer"),
+    (("turntable", "scenarios/satellites/gps_iif.json", "--size-px", "50"), 2, "--size-px has no effect without --png"),
     (("pd", T, "--sensor", "nix"), 1, r"--sensor nix: .*\(allowed: neossat/telescope\)"),
     (("pd", T, "--plot", F + "/x.pdf", "--trials", "1"), 2, "x.pdf: the name says neither PNG nor"),
     (("pd", T, "--rates", "2"), 2, "--rates has no effect without --stack"),
