@@ -173,6 +173,12 @@ LINES = [
     (("score", RUN, "--truth", T), 1, "track.json: /: is no list of points"),
     (("score", ELEMENTS, "--truth", RUN), 1, ":3: the first line must name the columns x, y and frame"),
     (("score", RUN, "--truth", RUN, "--sensor", "nix"), 1, "nix"),
+    (("score", F + "/points.csv", "--truth", RUN, "--least-score", "3"), 1, "--least-score 3: no point of .*points.csv has a"),
+    (("score", RUN, "--truth", F + "/points.csv", "--least-snr", "0"), 1, "--least-snr 0: no point of .*points.csv has a"),
+    (("score", F + "/points.csv", "--truth", RUN, "--what", "detections"), 2, "--what has no effect as"),
+    (("score", F + "/points.csv", "--truth", RUN, "--unknown"), 2, "--unknown has no effect as"),
+    (("score", F + "/points.csv", "--truth", F + "/points.csv", "--sensor", "a"), 2, "--sensor has no effect as neither"),
+    (("score", RUN, "--truth", RUN, "--what", "tracks", "--unknown"), 2, "--unknown has no effect with --what tracks"),
     (("score", "scenarios/orbits", "--truth", RUN), 1, "orbits: holds neither a run nor annotations"),
     (("calibrate-camera", T, "--out", OUT), 1, "calibrate-camera: scenarios/neossat_geo_track.json: is not a folder"),
     (("calibrate-camera", RUN, RUN, "--out", OUT), 2, "one folder of a run is expected, 2 were given"),
@@ -264,6 +270,7 @@ class Hostile(unittest.TestCase):
         head = "".join(f"{card[:10]}{card[10:].strip():>20}".ljust(80) if "=" in card else card.ljust(80)
                        for card in cards)
         cls.write("rows.csv", "file,time_utc\nnone.png,2024-08-26T17:45:45Z\n")
+        cls.write("points.csv", "x,y,frame\n3,4,1\n")
         cls.write("cut.fits", head.ljust(2880) + "\0" * 2880)
         cls.write("study.json", json.dumps({"boresight_study": 1, "name": "s", "kind": "loop", "seed": "0x1",
                                             "scenarios": [{"file": os.path.abspath(T)}], "replicates": 1}))
