@@ -238,6 +238,16 @@ LINES = [
     ((*STUDY, "--gather"), 2, "--gather: name the folders that --shard has made"),
     ((*STUDY, "--out", F + "/new", "--gather", F), 1, "is no folder of a study"),
     ((*STUDY, "--out", F + "/new", "--scheduler", F + "/none"), 1, "none: cannot be opened: No such file"),
+    ((*STUDY, "--dry-run", "--scheduler", F + "/none"), 1, "none: cannot be opened: No such file"),
+    ((*STUDY, "--dry-run", "--slurm", "--site", F + "/none"), 1, "none: cannot be opened: No such file"),
+    ((*STUDY, "--out", F + "/new", "--slurm", "--site", F + "/none"), 1, "none: cannot be opened: No such file"),
+    *(((*STUDY, *action, *words), 2, f"{words[0]} has no effect with {action[0]}: ") for action, option in (
+        (("--emit", "0"), ("out", "workers", "cores", "device", "scheduler", "slurm", "shard-runs", "unpinned")),
+        (("--gather", F), ("workers", "cores", "device", "scheduler", "slurm", "shard-runs", "unpinned")),
+        (("--shard", "1/2"), ("workers", "scheduler", "slurm", "shard-runs", "unpinned")),
+        (("--scheduler", F + "/none"), ("cores", "unpinned")), (("--slurm",), ("cores", "unpinned")))
+      for words in (("--" + name, *([] if name in ("slurm", "unpinned") else [OUT if name == "out" else "3"]))
+                    for name in option)),
     ((*STUDY, "--out", F + "/new", "--shard", "env/4"), 2, "set BORESIGHT_SHARD_INDEX"),
     ((*STUDY, "--scheduler", "x", "--slurm"), 2, "--slurm and --scheduler exclude each other"),
     ((*STUDY, "--dry-run", "--resume"), 2, "--dry-run and --resume exclude each other"),
