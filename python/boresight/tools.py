@@ -84,8 +84,9 @@ def lightcurve(scenario: Any = None, *, plugins: Sequence[str] = (),
     sees it, or of a satellite's shape (`satellite`) on the orbit of an element set.
 
     Returned:  [n] rows with the columns of the table: `time_utc` (datetime64), `seconds`, `v_mag`
-               (NAN: in the shadow, behind the Earth, or below the horizon), `phase_deg`, `range_km`,
-               `sunlit_fraction`, `earth_share`, and for sites `elevation_deg` and `azimuth_deg`
+               (NAN: in the shadow, behind the Earth, below the horizon, or no lit side is seen),
+               `phase_deg`, `range_km`, `sunlit_fraction`, `earth_share`, and for sites
+               `elevation_deg` and `azimuth_deg`
 
     >>> lightcurve(satellite="starlink_v1_5.json", elements="all.tle", norad=44713,
     ...            start="2022-06-16T04:00:00Z", site=[32.44, -110.79, 2790])["v_mag"]

@@ -30,6 +30,33 @@ static void print_help(const bst_option *table) {
     bst_options_print(stdout, table);
 }
 
+/* Which options are given. */
+typedef struct given {
+    bool curve, first_frame, json, markdown, tle, scenario;
+} given;
+
+/* Refuses unknown names, and what has no effect on the benchmarks, --curve or --first-frame. */
+static bst_status check_use(bst_ctx *ctx, const given *g, int count, char *const *names) {
+    const char *const modes[] = {g->curve ? "curve" : NULL, g->first_frame ? "first-frame" : NULL};
+    const char *mode = g->curve ? modes[0] : modes[1];
+    const char *unused = g->json       ? "json"
+                         : g->markdown ? "markdown"
+                         : g->tle      ? "tle"
+                         : g->scenario ? "scenario"
+                                       : NULL;
+    BST_TRY(bst_options_one_of(ctx, modes, 2));
+    if (mode && unused) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--%s has no effect with --%s: leave one of them out", unused, mode);
+    }
+    if (mode && count > (g->curve ? 1 : 0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s: %d benchmark names were given (allowed: %s)",
+                        mode, count, g->curve ? "one scene, or none" : "none");
+    }
+    BST_TRY(bst_bench_check_names(ctx, count, names));
+    return bst_bench_check_files(ctx, g->tle, g->scenario, count, names);
+}
+
 int bst_cmd_bench(int argc, char **argv) {
     bool help = false, markdown = false, curve = false, first_frame = false;
     const char *json = NULL, *report = "docs/results";
@@ -73,7 +100,7 @@ int bst_cmd_bench(int argc, char **argv) {
          .target = &options.scenario,
          .path = BST_PATH_INPUT,
          .argument = "FILE",
-         .doc = "scenario of loop_full, sim_* and env_* (default "
+         .doc = "scenario of loop_full, sim_*, env_* and study_100000 (default "
                 "scenarios/neossat_geo_track.json)"},
         {.name = "first-frame",
          .kind = BST_OPTION_FLAG,
@@ -93,7 +120,13 @@ int bst_cmd_bench(int argc, char **argv) {
         print_help(table);
         return BST_EXIT_OK;
     }
-    if (bst_bench_check_names(&ctx, arguments, argv + 1) != BST_OK) {
+    const given g = {.curve = curve,
+                     .first_frame = first_frame,
+                     .json = json != NULL,
+                     .markdown = markdown,
+                     .tle = options.tle_file != NULL,
+                     .scenario = options.scenario != scenario};
+    if (check_use(&ctx, &g, arguments, argv + 1) != BST_OK) {
         return bst_options_misuse(&ctx, "bench");
     }
     options.threads = (int)threads;

@@ -80,6 +80,25 @@ static const bst_option OPTIONS[] = {
     {.name = NULL},
 };
 
+/* Refuses to make nothing, and options of series that are not made. */
+static bst_status check_series(bst_ctx *ctx, const bst_calibration_frames *f) {
+    if (f->bias + f->dark + f->flat + f->linearity == 0) {
+        return bst_fail(
+            ctx, BST_ERR_ARGUMENT,
+            "--bias, --dark, --flat and --linearity are all 0, so that nothing would be made");
+    }
+    if (f->level_e > 0.0 && f->flat + f->linearity == 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--level has no effect, as --flat and --linearity are 0: leave it out");
+    }
+    if (f->exposure_s > 0.0 && f->dark + f->flat + f->linearity == 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--exposure has no effect, as --dark, --flat and --linearity are 0: leave "
+                        "it out");
+    }
+    return BST_OK;
+}
+
 int bst_cmd_calframes(int argc, char **argv) {
     calframes_request r = {.load = BST_LOAD_DEFAULTS,
                            .frames = {.bias = 10, .dark = 10, .flat = 10}};
@@ -107,12 +126,7 @@ int bst_cmd_calframes(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "calframes");
     }
-    if (r.frames.bias + r.frames.dark + r.frames.flat + r.frames.linearity == 0) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT,
-                 "--bias, --dark, --flat and --linearity are all 0, so that nothing would be made");
-        return bst_options_misuse(&ctx, "calframes");
-    }
-    if (bst_load_check(&ctx, &r.load, table) != BST_OK) {
+    if (check_series(&ctx, &r.frames) != BST_OK || bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "calframes");
     }
     bst_json *json = NULL;

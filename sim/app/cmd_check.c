@@ -80,6 +80,12 @@ int bst_cmd_check(int argc, char **argv) {
     if (!bst_command_line_read(&ctx, &line, argc, argv, &arguments, &code)) {
         return code;
     }
+    if (list_rules && (arguments > 0 || figures || quiet || load.set.count > 0 || load.seed ||
+                       load.duration_s >= 0.0 || load.run >= 0)) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "--rules lists the rules and checks no scenario: give it alone");
+        return bst_options_misuse(&ctx, "check");
+    }
     if (list_rules) {
         bst_check_rules_print(stdout);
         return BST_EXIT_OK;

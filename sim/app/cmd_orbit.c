@@ -28,11 +28,21 @@ static const char help_text[] =
     "\n"
     "options:\n";
 
-/* Error of an option for angles of a TDM that is given with a run. */
+/* Error of an option for angles of a TDM that is given with a run, or the reverse. */
 static bst_status check_options(bst_ctx *ctx, const bst_orbit_determination *q, const char *path) {
     struct stat info;
-    const char *option = bst_orbit_tdm_option(q);
-    if (!option || stat(path, &info) != 0 || !S_ISDIR(info.st_mode)) {
+    if (stat(path, &info) != 0) {
+        return BST_OK; /* an error of the reader */
+    }
+    const char *option = bst_orbit_run_option(q);
+    if (option && S_ISREG(info.st_mode)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--%s is for the tracks of a run, and %s is a file: give a run's folder, "
+                        "or leave --%s out",
+                        option, path, option);
+    }
+    option = bst_orbit_tdm_option(q);
+    if (!option || !S_ISDIR(info.st_mode)) {
         return BST_OK;
     }
     return bst_fail(ctx, BST_ERR_ARGUMENT,

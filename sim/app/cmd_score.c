@@ -37,5 +37,8 @@ int bst_cmd_score(int argc, char **argv) {
                  "one source of detections or tracks is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "score");
     }
+    if (bst_score_request_check(&ctx, &q, argv[1]) != BST_OK) {
+        return bst_options_misuse(&ctx, "score");
+    }
     return bst_command_line_end_as("score", &ctx, bst_score_run(&ctx, &q, argv[1], stdout));
 }

@@ -67,6 +67,9 @@ static int command(bst_ctx *ctx, const bst_study_request *r, const char *given) 
         status = checked ? BST_OK : bst_study_check(ctx, &study, kind);
         study.notes = plugins.notes;
         study.note_count = plugins.count;
+        if (status == BST_OK && r->dry_run) {
+            status = bst_study_check_inputs(ctx, r);
+        }
         if (status == BST_OK) {
             if (r->dry_run) {
                 bst_study_print_plan(&study, kind,

@@ -96,3 +96,31 @@ bst_status bst_bench_check_names(bst_ctx *ctx, int count, char *const *names) {
     }
     return BST_OK;
 }
+
+static bool reads_elements(const bst_bench *b) {
+    return b->run == bst_bench_sgp4 || b->run == bst_bench_ephemeris;
+}
+
+static bool reads_scenario(const bst_bench *b) {
+    return b->run == bst_bench_loop || b->run == bst_bench_sim_create ||
+           b->run == bst_bench_sim_clone || b->run == bst_bench_env || b->run == bst_bench_envs ||
+           b->run == bst_bench_study;
+}
+
+bst_status bst_bench_check_files(bst_ctx *ctx, bool tle, bool scenario, int count,
+                                 char *const *names) {
+    bool elements_read = false, scenario_read = false;
+    for (int b = 0; b < BST_BENCHES; b++) {
+        bool wanted = bst_bench_is_wanted(&bst_bench_list[b], count, names);
+        elements_read |= wanted && reads_elements(&bst_bench_list[b]);
+        scenario_read |= wanted && reads_scenario(&bst_bench_list[b]);
+    }
+    const char *unused = tle && !elements_read        ? "tle"
+                         : scenario && !scenario_read ? "scenario"
+                                                      : NULL;
+    return unused ? bst_fail(ctx, BST_ERR_ARGUMENT,
+                             "--%s has no effect on the benchmarks that are named: leave it out, "
+                             "or see --help for those that read it",
+                             unused)
+                  : BST_OK;
+}

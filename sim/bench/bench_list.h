@@ -20,4 +20,12 @@ bool bst_bench_is_wanted(const bst_bench *bench, int count, char *const *names);
  * Errors:    BST_ERR_ARGUMENT with the first that is not */
 bst_status bst_bench_check_names(bst_ctx *ctx, int count, char *const *names) BST_MUST_CHECK;
 
+/* Checks that one of the wanted benchmarks reads what is given.
+ *
+ * Given:     tle, scenario  a file of element sets, and a scenario, are given
+ *            names          [count] of benchmarks; none: all
+ * Errors:    BST_ERR_ARGUMENT with the option that has no effect */
+bst_status bst_bench_check_files(bst_ctx *ctx, bool tle, bool scenario, int count,
+                                 char *const *names) BST_MUST_CHECK;
+
 #endif

@@ -32,11 +32,16 @@ static bst_status own_program(bst_ctx *ctx, char path[4096]) {
     return BST_OK;
 }
 
+bst_status bst_study_site_load(bst_ctx *ctx, const char *file, bst_slurm_site *out) {
+    char path[4096];
+    return bst_slurm_site_load(ctx, file ? file : own_site(path, sizeof path), out);
+}
+
 bst_status bst_study_slurm(bst_ctx *ctx, const char *site_file, const char *device, const char *out,
                            bst_executor *executor) {
-    char path[4096], program[4096];
+    char program[4096];
     bst_slurm_site site;
-    BST_TRY(bst_slurm_site_load(ctx, site_file ? site_file : own_site(path, sizeof path), &site));
+    BST_TRY(bst_study_site_load(ctx, site_file, &site));
     BST_TRY(own_program(ctx, program));
     /* a task starts in OUT/slurm */
     const char *const task[] = {program, "study", "..", "--quiet", "--shard", NULL};

@@ -13,6 +13,7 @@
 #include "sim/studies/gather.h"
 #include "sim/studies/local_pool.h"
 #include "sim/studies/scheduler.h"
+#include "sim/studies/slurm.h"
 #include "sim/studies/study_folder.h"
 #include "sim/studies/study_outcome.h"
 #include "sim/studies/tables.h"
@@ -97,10 +98,13 @@ static bst_status open_executor(bst_ctx *ctx, const work *w, bst_executor *execu
                           : open_pool(ctx, w, executor);
 }
 
-/* Reads what the request names, so that a mistake leaves no folder behind. */
-static bst_status check_inputs(bst_ctx *ctx, const bst_study_request *r) {
+bst_status bst_study_check_inputs(bst_ctx *ctx, const bst_study_request *r) {
     for (int i = 0; i < r->part_count; i++) {
         BST_TRY(bst_study_gather_check(ctx, r->parts[i]));
+    }
+    bst_slurm_site site;
+    if (r->slurm) {
+        BST_TRY(bst_study_site_load(ctx, r->site, &site));
     }
     bst_scheduler scheduler;
     return r->scheduler ? bst_scheduler_load(ctx, r->scheduler, &scheduler) : BST_OK;
@@ -159,7 +163,7 @@ int bst_study_execute(bst_ctx *ctx, const bst_study_request *r, const bst_study 
         fprintf(stderr, "boresight: %s\n", ctx->message);
         return BST_EXIT_FAILED;
     }
-    bst_status status = check_inputs(ctx, r);
+    bst_status status = bst_study_check_inputs(ctx, r);
     if (status == BST_OK) {
         status = bst_study_folder_open(ctx, study, out, r->resume || r->gather, false, &lock);
     }

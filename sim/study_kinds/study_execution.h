@@ -5,6 +5,12 @@
 #include "sim/studies/kind.h"
 #include "sim/study_kinds/study_request.h"
 
+/* Reads the files and folders that a request names beside the study, so that a mistake is found
+ * before a folder is made.
+ *
+ * Errors:    those of bst_study_gather_check, bst_scheduler_load and bst_slurm_site_load */
+bst_status bst_study_check_inputs(bst_ctx *ctx, const bst_study_request *request) BST_MUST_CHECK;
+
 /* Executes the missing runs of a study with worker processes or Slurm, writes the tables once all
  * runs are done, and prints the outcome to stdout and errors to stderr.
  *

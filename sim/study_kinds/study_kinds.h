@@ -57,6 +57,11 @@ bst_status bst_study_print_scenario(bst_ctx *ctx, const bst_scenario *scenario,
 bst_status bst_study_scheduler(bst_ctx *ctx, const char *file, const char *device, const char *out,
                                bst_executor *executor) BST_MUST_CHECK;
 
+struct bst_slurm_site;
+/* Reads a site file of Slurm; `file` NULL: the user's own, or defaults if there is none. Errors of
+ * bst_slurm_site_load. */
+bst_status bst_study_site_load(bst_ctx *ctx, const char *file,
+                               struct bst_slurm_site *out) BST_MUST_CHECK;
 /* Creates the Slurm executor of the study in folder `out`. `site_file` NULL: the user's own, if
  * any; `device`: of its tasks, "": default. */
 bst_status bst_study_slurm(bst_ctx *ctx, const char *site_file, const char *device, const char *out,

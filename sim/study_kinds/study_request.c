@@ -98,6 +98,43 @@ const bst_option bst_study_options[] = {
     {.name = NULL},
 };
 
+/* What a study may be asked for beside its execution by worker processes here. */
+enum { SCHEMA = 1, EMIT = 2, GATHER = 4, SHARD = 8, SCHEDULED = 16 };
+
+/* Fails if an option has no effect on what the request asks for. A dry run takes the options of the
+ * execution that it is of. */
+static bst_status check_effects(bst_ctx *ctx, const bst_study_request *r) {
+    const struct {
+        const char *name;
+        bool given;
+        int what;
+    } asked[] = {{"schema", r->schema, SCHEMA},  {"emit", r->emit >= 0, EMIT},
+                 {"gather", r->gather, GATHER},  {"shard", r->shard != NULL, SHARD},
+                 {"slurm", r->slurm, SCHEDULED}, {"scheduler", r->scheduler != NULL, SCHEDULED}};
+    const struct {
+        const char *name;
+        bool given;
+        int useless; /* with any of these */
+    } options[] = {{"out", r->out != NULL, SCHEMA | EMIT},
+                   {"workers", r->workers > 0, SCHEMA | EMIT | GATHER | SHARD},
+                   {"cores", r->cores > 0, SCHEMA | EMIT | GATHER | SCHEDULED},
+                   {"device", r->device != NULL, SCHEMA | EMIT | GATHER},
+                   {"slurm", r->slurm, SCHEMA | EMIT | GATHER | SHARD},
+                   {"scheduler", r->scheduler != NULL, SCHEMA | EMIT | GATHER | SHARD},
+                   {"shard-runs", r->shard_runs > 0, SCHEMA | EMIT | GATHER | SHARD},
+                   {"unpinned", r->unpinned, SCHEMA | EMIT | GATHER | SHARD | SCHEDULED}};
+    for (size_t i = 0; i < sizeof options / sizeof *options; i++) {
+        for (size_t k = 0; k < sizeof asked / sizeof *asked && options[i].given; k++) {
+            if (asked[k].given && (options[i].useless & asked[k].what)) {
+                return bst_fail(ctx, BST_ERR_ARGUMENT,
+                                "--%s has no effect with --%s: leave one of them out",
+                                options[i].name, asked[k].name);
+            }
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_study_request_check(bst_ctx *ctx, const bst_study_request *r) {
     const char *const actions[] = {r->schema ? "schema" : NULL,   r->emit >= 0 ? "emit" : NULL,
                                    r->dry_run ? "dry-run" : NULL, r->resume ? "resume" : NULL,
@@ -106,5 +143,5 @@ bst_status bst_study_request_check(bst_ctx *ctx, const bst_study_request *r) {
     const char *const places[] = {r->workers > 0 ? "workers" : NULL, r->slurm ? "slurm" : NULL,
                                   r->scheduler ? "scheduler" : NULL};
     BST_TRY(bst_options_one_of(ctx, places, sizeof places / sizeof *places));
-    return BST_OK;
+    return check_effects(ctx, r);
 }

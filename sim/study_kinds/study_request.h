@@ -22,7 +22,7 @@ extern const bst_option bst_study_options[];
 /* Checks that the options given fit together.
  *
  * Errors:    BST_ERR_ARGUMENT: two options that each ask for another action, --workers with a
- *            scheduler, or two schedulers */
+ *            scheduler, two schedulers, or an option without effect on the action */
 bst_status bst_study_request_check(bst_ctx *ctx, const bst_study_request *request) BST_MUST_CHECK;
 
 #endif

@@ -94,6 +94,8 @@ FILES = [
 T, RUN, OUT, F = runs.TRACK, "{run}", "{folder}/none", "{folder}"
 SPAN = ("propagate", "--tle", ELEMENTS, "--start", "2022-06-16T00:00:00Z", "--stop",
         "2022-06-17T00:00:00Z")
+SHAPE = ("--satellite", "scenarios/satellites/gps_iif.json", "--elements", ELEMENTS, "--norad", "39089", "--start",
+         "2022-06-16T02:00:00Z")
 STUDY = ("study", "{folder}/study.json")
 # words, exit code, what the message says
 LINES = [
@@ -148,6 +150,8 @@ LINES = [
      "--last 2 is before --first 5"),
     (("export", RUN, "--coco", OUT, "--first", "99"), 1, "none of its frames is among .*it has 0 to 1"),
     (("export", RUN, "--coco", OUT, "--yolo", OUT), 2, "goes there too; give two paths"),
+    (("orbit", F + "/file", "--track", "3"), 2, "--track is for the tracks of a run, and .*/file is a file: give a"),
+    (("orbit", F + "/file", "--sensor", "x"), 2, "--sensor is for the tracks of a run"),
     (("orbit", RUN, "--step", "5"), 2, "--step has no effect without --oem"),
     (("solve", F + "/none.fits", "--scale", "3", "--utc", "2024-08-26T17:45:45Z"), 1, "none.fits"),
     (("solve", T, "--scale", "3", "--utc", "2024-08-26T17:45:45Z"), 1, "track.json"),
@@ -171,9 +175,16 @@ LINES = [
     (("score", RUN, "--truth", T), 1, "track.json: /: is no list of points"),
     (("score", ELEMENTS, "--truth", RUN), 1, ":3: the first line must name the columns x, y and frame"),
     (("score", RUN, "--truth", RUN, "--sensor", "nix"), 1, "nix"),
+    (("score", F + "/points.csv", "--truth", RUN, "--least-score", "3"), 1, "--least-score 3: no point of .*points.csv has a"),
+    (("score", RUN, "--truth", F + "/points.csv", "--least-snr", "0"), 1, "--least-snr 0: no point of .*points.csv has a"),
+    (("score", F + "/points.csv", "--truth", RUN, "--what", "detections"), 2, "--what has no effect as"),
+    (("score", F + "/points.csv", "--truth", RUN, "--unknown"), 2, "--unknown has no effect as"),
+    (("score", F + "/points.csv", "--truth", F + "/points.csv", "--sensor", "a"), 2, "--sensor has no effect as neither"),
+    (("score", RUN, "--truth", RUN, "--what", "tracks", "--unknown"), 2, "--unknown has no effect with --what tracks"),
     (("score", "scenarios/orbits", "--truth", RUN), 1, "orbits: holds neither a run nor annotations"),
     (("calibrate-camera", T, "--out", OUT), 1, "calibrate-camera: scenarios/neossat_geo_track.json: is not a folder"),
     (("calibrate-camera", RUN, RUN, "--out", OUT), 2, "one folder of a run is expected, 2 were given"),
+    (("calibrate-camera", RUN, "--out", OUT, "--psf-radius", "9"), 2, "--psf-radius has no effect without --psf-col"),
     (("calibrate-camera", RUN, "--out", OUT, "--sensor", "nix"), 1, "nix"),
     (("characterize", "--map", "neossat", "--out", OUT), 2, "--bias, --dark or --flat is expected"),
     (("characterize", "--map", "nix", "--bias", RUN, "--out", OUT), 1, "--map nix: there is no such keyword map"),
@@ -182,17 +193,32 @@ LINES = [
     (("characterize", "--map", "boresight", "--bias", RUN, "--warm", RUN, "--out", OUT), 2, "--warm and --warmer belong together"),
     (("characterize", "--map", "boresight", "--bias", RUN, "--linearity", T, "--out", OUT), 1, "track.json: does not begin as a FITS file"),
     (("characterize", "--map", "boresight", "--bias", RUN, "--linearity", RUN, "--out", OUT), 1, "the flats have 1 exposures .allowed: 6 or more"),
+    (("characterize", "--map", "boresight", "--bias", RUN, "--pitch", "9", "--out", OUT), 2, "--pitch has no effect without"),
+    (("characterize", "--map", "boresight", "--bias", RUN, "--maps", "--out", OUT), 2, "--maps has no effect without --dark or"),
     (("characterize", "--map", "boresight", "--bias", RUN, "--pitch", "0", "--out", OUT), 2, "--pitch 0: give a number from 0.5"),
     (("challenge", "x", "--out", OUT), 2, "one seed is expected, such as 42 or 0x2A"),
     (("challenge", "-1", "--out", OUT), 2, "unknown option -1|one seed is expected"),
     (("challenge", "1", "--out", OUT, "--sequences", "0"), 2, "--sequences 0: give an integer from 1"),
+    (("check", T, "--rules"), 2, "--rules lists the rules and checks no scenario: give it alone"),
     (("check", T, "--figures", F), 2, "--figures .*: is a folder; give the name of a file in it"),
     (("loop", T, "--plot", F + "/x.gif"), 2, "x.gif: the name says neither PNG nor SVG"),
     (("loop", T, "--sensor", "nix"), 1, r"--sensor nix: .*track.json has no such sensor \(allowed: neossat/tel"),
     (("lightcurve", T, "--object", "nix"), 1, "--object nix: the scenario has no such object"),
     (("lightcurve", T, "--step", "0"), 2, "--step 0: give a number from"),
+    *((("lightcurve", T, "--" + name, *value), 2, f"--{name} has no effect without --satellite")
+      for name, *value in (("elements", ELEMENTS), ("norad", "5"), ("observer-norad", "5"), ("attitude", "sun"),
+                           ("earthshine",))),
+    (("lightcurve", T, "--extinction", "1"), 2, "--extinction has no effect without --site"),
+    (("lightcurve", T, "--site", "1,1,1", "--observer", "neossat"), 2, "--site and --observer exclude each other"),
+    *((("lightcurve", *SHAPE, *words), 2, says) for words, says in (
+        (("--observer-norad", "44801", "--extinction", "1"), "--extinction has no effect without --site"),
+        (("--observer-norad", "44801", "--site", "1,1,1"), "--site and --observer-norad exclude each other"),
+        (("--site", "1,1,1", "--object", "x"), "--object is for a scenario, and --satellite was given"),
+        (("--site", "1,1,1", "--observer", "x"), "--observer is for a scenario"),
+        (("--site", "1,1,1", "--set", "/seed=3"), "--set is for a scenario"))),
     (("turntable", T + "/x"), 1, "x: "),
     (("turntable", "scenarios/satellites/gps_iif.json", "--size-px", "0"), 2, "--size-px 0: give an integer"),
+    (("turntable", "scenarios/satellites/gps_iif.json", "--size-px", "50"), 2, "--size-px has no effect without --png"),
     (("pd", T, "--sensor", "nix"), 1, r"--sensor nix: .*\(allowed: neossat/telescope\)"),
     (("pd", T, "--plot", F + "/x.pdf", "--trials", "1"), 2, "x.pdf: the name says neither PNG nor"),
     (("pd", T, "--rates", "2"), 2, "--rates has no effect without --stack"),
@@ -204,9 +230,19 @@ LINES = [
     (("pd", T, "--pair", "--separation", "1", "--trials", "1000000000", "--cell", "5"), 1, r"--cell 5: at least"),
     (("calframes", T, "--out", OUT, "--sensor", "nix"), 1, r"\(allowed: neossat/telescope\)"),
     (("calframes", T, "--out", OUT, "--bias", "0", "--dark", "0", "--flat", "0"), 2, "nothing would be made"),
+    (("calframes", T, "--out", OUT, "--flat", "0", "--level", "5"), 2, "--level has no effect, as --flat and"),
+    (("calframes", T, "--out", OUT, "--flat", "0", "--dark", "0", "--exposure", "5"), 2, "--exposure has no effect, as"),
     (("calframes", T, "--out", OUT, "--linearity", "-1"), 2, "--linearity -1: give an integer from 0"),
     (("calibrate-obsgen", "--check", T, T, "--json", OUT), 2, "--json takes the figures of one scenario"),
     (("calibrate-obsgen", T, "--out", OUT, "--json", OUT + "2"), 2, "--json has no effect without --check"),
+    (("bench", "--curve", "--json", F + "/new"), 2, "--json has no effect with --curve"),
+    (("bench", "--first-frame", "--markdown"), 2, "--markdown has no effect with --first-frame"),
+    (("bench", "--first-frame", "--curve"), 2, "--curve and --first-frame exclude each other"),
+    (("bench", "--curve", "small", "worst_case"), 2, "--curve: 2 benchmark names were given .allowed: one scene, or none"),
+    (("bench", "--first-frame", "small"), 2, "--first-frame: 1 benchmark names were given .allowed: none"),
+    (("bench", "small", "--scenario", T), 2, "--scenario has no effect on the benchmarks that are named"),
+    (("bench", "loop_full", "--tle", ELEMENTS), 2, "--tle has no effect on the benchmarks that are named"),
+    (("bench", "--curve", "--scenario", T), 2, "--scenario has no effect with --curve"),
     (("bench", "small", "--report", F), 2, "--report has no effect without --curve"),
     ((*SPAN, "--step", "1e-6"), 2, "8.64e.10 rows of each satellite .allowed: 100000000"),
     ((*SPAN, "--step", "600", "--elements", ELEMENTS), 2, "are the same: give one of them"),
@@ -218,6 +254,16 @@ LINES = [
     ((*STUDY, "--gather"), 2, "--gather: name the folders that --shard has made"),
     ((*STUDY, "--out", F + "/new", "--gather", F), 1, "is no folder of a study"),
     ((*STUDY, "--out", F + "/new", "--scheduler", F + "/none"), 1, "none: cannot be opened: No such file"),
+    ((*STUDY, "--dry-run", "--scheduler", F + "/none"), 1, "none: cannot be opened: No such file"),
+    ((*STUDY, "--dry-run", "--slurm", "--site", F + "/none"), 1, "none: cannot be opened: No such file"),
+    ((*STUDY, "--out", F + "/new", "--slurm", "--site", F + "/none"), 1, "none: cannot be opened: No such file"),
+    *(((*STUDY, *action, *words), 2, f"{words[0]} has no effect with {action[0]}: ") for action, option in (
+        (("--emit", "0"), ("out", "workers", "cores", "device", "scheduler", "slurm", "shard-runs", "unpinned")),
+        (("--gather", F), ("workers", "cores", "device", "scheduler", "slurm", "shard-runs", "unpinned")),
+        (("--shard", "1/2"), ("workers", "scheduler", "slurm", "shard-runs", "unpinned")),
+        (("--scheduler", F + "/none"), ("cores", "unpinned")), (("--slurm",), ("cores", "unpinned")))
+      for words in (("--" + name, *([] if name in ("slurm", "unpinned") else [OUT if name == "out" else "3"]))
+                    for name in option)),
     ((*STUDY, "--out", F + "/new", "--shard", "env/4"), 2, "set BORESIGHT_SHARD_INDEX"),
     ((*STUDY, "--scheduler", "x", "--slurm"), 2, "--slurm and --scheduler exclude each other"),
     ((*STUDY, "--dry-run", "--resume"), 2, "--dry-run and --resume exclude each other"),
@@ -250,6 +296,7 @@ class Hostile(unittest.TestCase):
         head = "".join(f"{card[:10]}{card[10:].strip():>20}".ljust(80) if "=" in card else card.ljust(80)
                        for card in cards)
         cls.write("rows.csv", "file,time_utc\nnone.png,2024-08-26T17:45:45Z\n")
+        cls.write("points.csv", "x,y,frame\n3,4,1\n")
         cls.write("cut.fits", head.ljust(2880) + "\0" * 2880)
         cls.write("study.json", json.dumps({"boresight_study": 1, "name": "s", "kind": "loop", "seed": "0x1",
                                             "scenarios": [{"file": os.path.abspath(T)}], "replicates": 1}))

@@ -83,6 +83,28 @@ class Shapes(unittest.TestCase):
         self.assertEqual(shown.returncode, 0, shown.stderr)
         self.assertEqual(len(shown.stdout.splitlines()), 5)
 
+    def test_light_curve_of_the_observer_itself(self):
+        """An object on the orbit of its observer has no magnitude; from a site it has one."""
+        with open("scenarios/neossat_geo_track.json", encoding="utf-8") as file:
+            scenario = json.load(file)
+        for body in (*scenario["world"]["objects"], *scenario["observers"]):
+            body["orbit"]["elements_file"] = os.path.abspath("scenarios/catalogue_2022-06.tle")
+        del scenario["observers"][0]["sensors"][0]["modules"]["obsgen"]
+        scenario["world"]["objects"].append({"name": "SELF", "area_m2": 1, "albedo": 0.2,
+                                             "orbit": scenario["observers"][0]["orbit"]})
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "scenario.json")
+            with open(path, "w", encoding="utf-8") as file:
+                json.dump(scenario, file)
+            words = ["lightcurve", path, "--object", "SELF", "--duration", "60"]
+            shown = boresight(*words)
+            self.assertEqual(shown.returncode, 1, shown.stderr)
+            self.assertEqual(shown.stdout, "")
+            self.assertIn("object SELF: the observer neossat is at its place after 0 s; give another --object or "
+                          "--observer, or --site", shown.stderr)
+            shown = boresight(*words, "--site", "32.44,-110.79,2790")
+            self.assertEqual(shown.returncode, 0, shown.stderr)
+
     def test_scenes_without_shapes(self):
         """A shape that is out of the field, and the files of its model, change no byte of the frames."""
         elements = {"source": "keplerian", "semi_major_axis_m": 42164170, "eccentricity": 0, "inclination_deg": 0,
@@ -137,6 +159,8 @@ class Shapes(unittest.TestCase):
                 (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--site", "1,1,1", "--attitude", "{1"], 1, "--attitude:1:2"),
                 (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--site", "1,1,1", "--attitude", '{"law": "up"}'], 1,
                  "/world/objects/0/attitude/0/law"),
+                (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--observer-norad", "39089"], 1,
+                 "--observer-norad 39089: is at the place of the satellite itself"),
                 (["turntable"], 2, "one satellite is expected"),
                 (["turntable", "no.json"], 1, "no.json")):
             shown = boresight(*words)

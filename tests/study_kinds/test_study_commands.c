@@ -178,6 +178,20 @@ static void test_options_that_exclude_each_other(void **state) {
     r = (bst_study_request){.emit = -1, .slurm = true, .workers = 2};
     assert_int_equal(bst_study_request_check(&ctx, &r), BST_ERR_ARGUMENT);
     assert_true(strstr(ctx.message, "--workers") && strstr(ctx.message, "--slurm"));
+    /* options without effect; a part that is executed here has cores and a device */
+    r = (bst_study_request){.emit = 3, .cores = 5};
+    assert_int_equal(bst_study_request_check(&ctx, &r), BST_ERR_ARGUMENT);
+    assert_true(strstr(ctx.message, "--cores has no effect with --emit"));
+    r = (bst_study_request){.emit = -1, .shard = "1/2", .shard_runs = 7};
+    assert_int_equal(bst_study_request_check(&ctx, &r), BST_ERR_ARGUMENT);
+    assert_true(strstr(ctx.message, "--shard-runs has no effect with --shard"));
+    r = (bst_study_request){.emit = -1, .shard = "1/2", .cores = 2, .device = "x", .out = "y"};
+    bst_assert_ok(&ctx, bst_study_request_check(&ctx, &r));
+    r = (bst_study_request){
+        .emit = -1, .dry_run = true, .workers = 2, .cores = 2, .unpinned = true};
+    bst_assert_ok(&ctx, bst_study_request_check(&ctx, &r));
+    r = (bst_study_request){.emit = -1, .slurm = true, .device = "x", .shard_runs = 7};
+    bst_assert_ok(&ctx, bst_study_request_check(&ctx, &r));
 }
 
 int main(void) {

@@ -53,6 +53,7 @@ const bst_option bst_camera_calibration_options[] = {
      .minimum = 1,
      .maximum = BST_EFFECTIVE_PSF_NODES},
     {.name = "psf-radius",
+     .needs = "psf-columns|psf-rows",
      .kind = BST_OPTION_INT,
      .offset = offsetof(Q, psf_radius_px),
      .argument = "PX",

@@ -67,6 +67,7 @@ const bst_option bst_characterize_options[] = {
          "frames that boresight calframes made with detector.json, like the darks (without darks "
          "the bias frames, else the flats), to compare with them"},
     {.name = "pitch",
+     .needs = "dark",
      .kind = BST_OPTION_REAL,
      .offset = offsetof(Q, pixel_pitch_um),
      .argument = "UM",
@@ -85,6 +86,7 @@ const bst_option bst_characterize_options[] = {
      .argument = "POINTER",
      .doc = "place of the camera in that scenario (default /observers/0/sensors/0/camera)"},
     {.name = "maps",
+     .needs = "dark|flat",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(Q, maps),
      .doc =

@@ -387,6 +387,10 @@ const char *bst_orbit_tdm_option(const bst_orbit_determination *q) {
                                                            : NULL;
 }
 
+const char *bst_orbit_run_option(const bst_orbit_determination *q) {
+    return q->choice.track > 0 ? "track" : q->choice.sensor ? "sensor" : NULL;
+}
+
 bst_status bst_orbit_determine(bst_ctx *ctx, const bst_orbit_determination *q, const char *path) {
     bst_orbit_request wanted = q->choice;
     wanted.angles.sigma_rad = (q->sigma_arcsec > 0.0 ? q->sigma_arcsec : 1.0) * BST_ARCSEC_RAD;

@@ -32,6 +32,8 @@ typedef struct bst_orbit_determination {
 
 /* The first option for angles of a TDM that a request has, such as "sigma"; NULL: none. */
 const char *bst_orbit_tdm_option(const bst_orbit_determination *request);
+/* The first option for the tracks of a run that a request has, such as "track"; NULL: none. */
+const char *bst_orbit_run_option(const bst_orbit_determination *request);
 
 /* Determines the orbit of a track of a run's folder or a TDM, `path`; prints it and writes the
  * files. Errors of reading, solution and writing. */

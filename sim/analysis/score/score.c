@@ -4,9 +4,11 @@
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "sim/cli/print_json.h"
 #include "sim/core/json_number.h"
+#include "sim/io/run_files.h"
 
 #define Q bst_score_request
 const bst_option bst_score_request_options[] = {
@@ -175,14 +177,37 @@ static bst_status report(bst_ctx *ctx, const bst_score_request *q, const char *p
     return q->json ? bst_cli_write_json(ctx, q->json, to_json(q, path, &result)) : BST_OK;
 }
 
+static bst_status fail_unused(bst_ctx *ctx, const char *option, const char *why) {
+    return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s has no effect %s: leave it out", option, why);
+}
+
+bst_status bst_score_request_check(bst_ctx *ctx, const bst_score_request *q, const char *found) {
+    struct stat info;
+    if (stat(found, &info) != 0 || stat(q->truth, &info) != 0) {
+        return BST_OK; /* an error of the reader */
+    }
+    bool is_run = bst_io_folder_is_run(found);
+    if (q->sensor && !is_run && !bst_io_folder_is_run(q->truth)) {
+        return fail_unused(ctx, "sensor", "as neither source is the folder of a run");
+    }
+    if ((q->what >= 0 || q->unknown) && !is_run) {
+        return fail_unused(ctx, q->unknown ? "unknown" : "what",
+                           "as the points found are not those of a run's folder");
+    }
+    return q->unknown && q->what == BST_SCORE_TRACKS
+               ? fail_unused(ctx, "unknown", "with --what tracks")
+               : BST_OK;
+}
+
 bst_status bst_score_run(bst_ctx *ctx, const bst_score_request *q, const char *path, FILE *out) {
     bst_score_points truth = {0}, found = {0};
-    const bst_score_selection known = {.what = BST_SCORE_TRUTH,
-                                       .sensor = q->sensor,
-                                       .least_snr = q->least_snr,
-                                       .least_score = NAN};
+    const bst_score_selection known = {
+        .what = BST_SCORE_TRUTH, .sensor = q->sensor, .least_snr = q->least_snr};
     const bst_score_selection tested = {
-        .what = q->what, .sensor = q->sensor, .unknown = q->unknown, .least_score = q->least_score};
+        .what = q->what == BST_SCORE_TRACKS ? BST_SCORE_TRACKS : BST_SCORE_DETECTIONS,
+        .sensor = q->sensor,
+        .unknown = q->unknown,
+        .least_score = q->least_score};
     bst_status status = bst_score_points_read(ctx, q->truth, &known, &truth);
     if (status == BST_OK) {
         status = bst_score_points_read(ctx, path, &tested, &found);

@@ -52,6 +52,23 @@ static void sort_points(bst_score_points *p) {
     p->frame_count = kept;
 }
 
+/* Fails if the selection compares scores and no point has one. */
+static bst_status check_scores(bst_ctx *ctx, const char *path, const bst_score_selection *selection,
+                               const bst_score_points *p) {
+    bool is_truth = selection->what == BST_SCORE_TRUTH;
+    double least = is_truth ? selection->least_snr : selection->least_score;
+    bool known = least == -(double)INFINITY || p->count == 0;
+    for (int i = 0; i < p->count && !known; i++) {
+        known = !isnan(p->items[i].score);
+    }
+    return known ? BST_OK
+                 : bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "%s %g: no point of %.400s has a score or SNR (allowed: a run, SatNet "
+                            "annotations with confidence or snr_aperture, CSV with the column "
+                            "score or snr)",
+                            is_truth ? "--least-snr" : "--least-score", least, path);
+}
+
 /* Removes points below the least score. */
 static void leave_out_weak(bst_score_points *p, double least_score) {
     int kept = 0;
@@ -172,6 +189,7 @@ bst_status bst_score_points_read(bst_ctx *ctx, const char *path,
     } else {
         status = read_csv(ctx, path, out);
     }
+    status = status == BST_OK ? check_scores(ctx, path, selection, out) : status;
     if (status == BST_OK && selection->what != BST_SCORE_TRUTH) {
         leave_out_weak(out, selection->least_score);
     }

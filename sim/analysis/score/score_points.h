@@ -40,15 +40,16 @@ typedef struct bst_score_selection {
     int what;           /* BST_SCORE_... of a run */
     const char *sensor; /* OBSERVER/SENSOR of a run; NULL: all, each a sequence */
     bool unknown;       /* detections without a label count, too */
-    double least_snr;   /* fainter true objects are optional */
-    double least_score; /* found points with a lower score are left out; NAN: none */
+    double least_snr;   /* fainter true objects are optional; -INFINITY: none */
+    double least_score; /* found points with a lower score are left out; -INFINITY: none */
 } bst_score_selection;
 
 /* Reads points from the folder of a run, a folder of SatNet annotations or a file of it, a JSON
  * file as the spotGEO competition has them, or a CSV file (docs/how-to/score.md).
  *
  * Errors:    BST_ERR_NOT_FOUND: no such path, sensor or table; BST_ERR_FORMAT with file, place and
- *            what is allowed; BST_ERR_MEMORY
+ *            what is allowed; BST_ERR_ARGUMENT: a least SNR or score, and points of which none has
+ *            one; BST_ERR_MEMORY
  * Ownership: free *out with bst_score_points_free, also after an error */
 bst_status bst_score_points_read(bst_ctx *ctx, const char *path,
                                  const bst_score_selection *selection,

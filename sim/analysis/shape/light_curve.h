@@ -28,11 +28,13 @@ typedef struct bst_light_curve_request {
  *
  * Given:     request   what is asked for
  *            scenario  NULL: request->satellite on an orbit of request->elements
- * Errors:    BST_ERR_ARGUMENT with the option, BST_ERR_CONFIG of the satellite, those of the
- * orbits, BST_ERR_IO Notes:     columns: time, seconds after the start, V magnitude (empty: dark,
- * occulted or below the horizon), phase angle, range, visible part of the Sun, fraction that is
- * earthlight, elevation and azimuth (sites; empty otherwise). For a site the magnitude includes
- *            extinction by the air mass of Kasten and Young, Appl. Opt. 28, 4735 (1989). */
+ * Errors:    BST_ERR_ARGUMENT with the option, also where the observer is the object itself;
+ *            BST_ERR_CONFIG of the satellite, those of the orbits, BST_ERR_IO
+ * Notes:     columns: time, seconds after the start, V magnitude (empty: in the shadow, its lit
+ *            side not seen, occulted or below the horizon), phase angle, range, visible part of the
+ *            Sun, fraction that is earthlight, elevation and azimuth (sites; empty otherwise). For
+ *            a site the magnitude includes extinction by the air mass of Kasten and Young, Appl.
+ *            Opt. 28, 4735 (1989). */
 bst_status bst_light_curve_make(bst_ctx *ctx, const bst_light_curve_request *request,
                                 const bst_scenario *scenario) BST_MUST_CHECK;
 

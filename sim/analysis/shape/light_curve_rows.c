@@ -9,6 +9,9 @@
  * own, and its rows do not depend on who computes it. */
 enum { BLOCK_ROWS = 512 };
 
+/* An object that is nearer is the observer itself; positions are exact to far less. */
+static const double SAME_PLACE_M = 0.01;
+
 /* A block's outcome. */
 typedef struct block {
     bst_status status;
@@ -46,6 +49,27 @@ static bst_status row_of_site(bst_ctx *ctx, const bst_light_curve *c, bst_world_
     return BST_OK;
 }
 
+/* Fails where the observer is at the place of the object, from which there is no magnitude. */
+static bst_status check_range(bst_ctx *ctx, const bst_light_curve *c,
+                              const bst_light_curve_row *row) {
+    const bst_light_curve_request *r = c->request;
+    if (row->sight.range_m > SAME_PLACE_M) {
+        return BST_OK;
+    }
+    if (c->observing_object >= 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--observer-norad %lld: is at the place of the satellite itself, --norad "
+                        "%lld, after %g s; give another satellite, or --site",
+                        (long long)r->observer_norad, (long long)r->norad, row->seconds);
+    }
+    return bst_fail(ctx, BST_ERR_ARGUMENT,
+                    "object %s: the observer%s%s is at its place after %g s; give another --object "
+                    "or --observer, or --site",
+                    bst_world_object(c->world, c->object)->name, c->observer >= 0 ? " " : "",
+                    c->observer >= 0 ? bst_world_observer_name(c->world, c->observer) : "",
+                    row->seconds);
+}
+
 static bst_status make_row(bst_ctx *ctx, const bst_light_curve *c, bst_world_view *view,
                            double seconds, bst_light_curve_row *out) {
     double at_s = c->start_s + seconds;
@@ -60,6 +84,7 @@ static bst_status make_row(bst_ctx *ctx, const bst_light_curve *c, bst_world_vie
     } else {
         BST_TRY(bst_world_view_sight(ctx, view, c->observer, c->object, at_s, &out->sight));
     }
+    BST_TRY(check_range(ctx, c, out));
     out->v_mag = out->sight.occulted ? (double)INFINITY : out->sight.v_mag;
     return BST_OK;
 }

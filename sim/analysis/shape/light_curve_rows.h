@@ -27,7 +27,8 @@ typedef struct bst_light_curve_row {
  *
  * Given:     threads  0: one per available processor
  * Returned:  rows  [count], the same for any number of threads
- * Errors:    those of the first row whose orbit has no state; BST_ERR_MEMORY */
+ * Errors:    those of the first row whose orbit has no state; BST_ERR_ARGUMENT: the observer is
+ *            the object itself; BST_ERR_MEMORY */
 bst_status bst_light_curve_rows(bst_ctx *ctx, const bst_light_curve *c, int threads, int count,
                                 bst_light_curve_row *rows) BST_MUST_CHECK;
 
