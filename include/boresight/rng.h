@@ -57,11 +57,15 @@ void bst_rng_normal2(bst_rng_key key, uint64_t a, uint64_t b, double out[2]);
  *                 bst_rng_normal2 within 1e-15 */
 void bst_rng_normal_block(bst_rng_key key, uint64_t first, double out[2][BST_RNG_BLOCK]);
 
-/* bst_rng_normal and bst_rng_uniform for the 16 counters (a, first), (a, first + 1), ...
+/* bst_rng_normal for the 16 counters (a, first), (a, first + 1), ...
  *
- * Returned:  out  [i]: the deviate of counter (a, first + i); normal ones equal those of
- *                 bst_rng_normal within 1e-15, uniform ones exactly those of bst_rng_uniform */
+ * Returned:  out  [i]: the deviate of counter (a, first + i), equal to that of bst_rng_normal
+ *                 within 1e-15 */
 void bst_rng_normal_draws(bst_rng_key key, uint64_t a, uint64_t first, double out[BST_RNG_BLOCK]);
+
+/* bst_rng_uniform for the 16 counters (a, first), (a, first + 1), ...
+ *
+ * Returned:  out  [i]: the deviate of counter (a, first + i) */
 void bst_rng_uniform_draws(bst_rng_key key, uint64_t a, uint64_t first, double out[BST_RNG_BLOCK]);
 
 /* One standard normal deviate for counter (a, b): the first of bst_rng_normal2. */
