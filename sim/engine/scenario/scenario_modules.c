@@ -261,7 +261,11 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json,
                                     true);
     }
     if (status == BST_OK) {
-        module->rate_hz = common.rate_hz > 0.0 ? common.rate_hz : module->desc->default_rate_hz;
+        bool inputs_only = module->desc->flags & (BST_MODULE_INPUTS_ONLY | BST_MODULE_DEFERRABLE);
+        module->given_rate_hz = common.rate_hz;
+        module->rate_hz = inputs_only            ? 0.0
+                          : common.rate_hz > 0.0 ? common.rate_hz
+                                                 : module->desc->default_rate_hz;
         module->offset_s = common.offset_s;
         if (module->rate_hz > 0.0 && bst_period_ticks(ctx, scenario->tick_rate_hz, module->rate_hz,
                                                       &module->period_ticks) != BST_OK) {
