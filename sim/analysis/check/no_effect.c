@@ -6,16 +6,19 @@
 
 #include <cjson/cJSON.h>
 
-enum { KEY_BYTES = BST_CONFIG_KEY_BYTES, PATH_BYTES = 300, WORDS_BYTES = 700 };
+enum {
+    KEY_BYTES = BST_CONFIG_KEY_BYTES,
+    PATH_BYTES = 300,
+    MOST_PLACES = 3, /* of one key that are reported one by one */
+};
 
 /* Search for one key of the table. */
 typedef struct search {
     const bst_scenario *scenario;
     const bst_no_effect *entry;
     char key[PATH_BYTES];
-    int count;              /* places where it has no effect */
-    char first[PATH_BYTES]; /* the first of them */
-    char because[PATH_BYTES];
+    bst_ctx *ctx;
+    int count; /* places where it has no effect */
 } search;
 
 /* Takes the next part of a text up to `separator`. False at its end. */
@@ -208,9 +211,9 @@ static void look(search *s, const cJSON *given, const cJSON *used, const char *w
     if (n < 0 || (size_t)n >= sizeof path || is_default(desc_of(s->scenario, path), value)) {
         return;
     }
-    if (s->count++ == 0) {
-        memcpy(s->first, path, sizeof path);
-        memcpy(s->because, because, sizeof because);
+    if (s->count++ < MOST_PLACES) {
+        bst_log(s->ctx, BST_LOG_WARNING, "%s: %s has no effect: %s", s->scenario->file, path,
+                because);
     }
 }
 
@@ -243,35 +246,31 @@ static void walk(search *s, const char *pattern, const cJSON *given, const cJSON
     }
 }
 
-static void report(bst_ctx *ctx, const search *s) {
-    char more[60] = "";
-    if (s->count > 1) {
-        snprintf(more, sizeof more, "; %d more like it", s->count - 1);
+/* True if nothing but messages makes a module step; without triggers it steps once, at offset_s. */
+static bool has_no_clock(const bst_scenario_module_config *module) {
+    bool triggered = false;
+    for (int p = 0; p < module->desc->port_count; p++) {
+        triggered |= (module->desc->ports[p].flags & BST_PORT_TRIGGER) != 0;
     }
-    if (s->count > 0) {
-        bst_log(ctx, BST_LOG_WARNING, "%s: %s has no effect: %s%s", s->scenario->file, s->first,
-                s->because, more);
-    }
+    return triggered && module->rate_hz == 0.0;
 }
 
-/* Warns of steps by the clock that a module does not have. */
+/* Warns of keys of steps by the clock that a module does not have. */
 static void warn_of_steps(bst_ctx *ctx, const bst_scenario *scenario) {
     for (int m = 0; m < scenario->module_count; m++) {
         const bst_scenario_module_config *module = &scenario->modules[m];
-        char where[PATH_BYTES] = "/tasking";
-        if (module->observer >= 0) {
-            snprintf(where, sizeof where, "/observers/%d/sensors/%d/modules/%s", module->observer,
-                     module->sensor, module->name);
-        }
-        if (module->given_rate_hz > 0.0 && module->rate_hz == 0.0) {
-            bst_log(ctx, BST_LOG_WARNING,
-                    "%s: %s/rate_hz has no effect: %s \"%s\" steps when its inputs come",
-                    scenario->file, where, module->desc->role, module->desc->type);
-        }
-        if (module->offset_s > 0.0 && module->rate_hz == 0.0) {
-            bst_log(ctx, BST_LOG_WARNING,
-                    "%s: %s/offset_s has no effect: %s \"%s\" steps when its inputs come",
-                    scenario->file, where, module->desc->role, module->desc->type);
+        const struct {
+            const char *key;
+            double value;
+        } keys[] = {{"rate_hz", module->given_rate_hz}, {"offset_s", module->offset_s}};
+        for (int k = 0; k < 2 && has_no_clock(module) && module->observer >= 0; k++) {
+            if (keys[k].value > 0.0) {
+                bst_log(ctx, BST_LOG_WARNING,
+                        "%s: /observers/%d/sensors/%d/modules/%s/%s has no effect: %s \"%s\" steps "
+                        "when its inputs come",
+                        scenario->file, module->observer, module->sensor, module->name, keys[k].key,
+                        module->desc->role, module->desc->type);
+            }
         }
     }
 }
@@ -280,14 +279,17 @@ void bst_no_effect_warn(bst_ctx *ctx, const bst_scenario *scenario) {
     warn_of_steps(ctx, scenario);
     cJSON *used = scenario->written ? bst_scenario_echo(scenario) : NULL;
     for (const bst_no_effect *entry = bst_no_effect_table; used && entry->where; entry++) {
-        search s = {.scenario = scenario, .entry = entry};
+        search s = {.scenario = scenario, .entry = entry, .ctx = ctx};
         for (const char *keys = entry->keys; next_part(&keys, ' ', s.key, sizeof s.key);) {
-            char pattern[WORDS_BYTES];
+            char pattern[PATH_BYTES];
             s.count = 0;
             for (const char *at = entry->where; next_part(&at, ' ', pattern, sizeof pattern);) {
                 walk(&s, pattern, scenario->written, used, "");
             }
-            report(ctx, &s);
+            if (s.count > MOST_PLACES) {
+                bst_log(ctx, BST_LOG_WARNING, "%s: %s has no effect in %d places more",
+                        scenario->file, s.key, s.count - MOST_PLACES);
+            }
         }
     }
     cJSON_Delete(used);

@@ -32,8 +32,9 @@ extern const bst_no_effect bst_no_effect_table[]; /* ends with where NULL */
 
 /* Warns of each key that the scenario's file, a file that it extends or an override gives, with
  * another value than the default, while its governing keys leave it without effect:
- * "FILE: /path has no effect: KEY is VALUE". A key that many observers or objects have is reported
- * once, with their number. Governing keys that /changes changes count as if they allowed it. */
+ * "FILE: /path has no effect: KEY is VALUE". Of a key that many observers or objects have, three
+ * places are reported, and the number of the others. Governing keys that /changes changes count as
+ * if they allowed it. */
 void bst_no_effect_warn(bst_ctx *ctx, const bst_scenario *scenario);
 
 #endif
