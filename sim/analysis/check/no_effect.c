@@ -177,6 +177,13 @@ static const bst_config_desc *desc_of(const bst_scenario *scenario, const char *
     return found;
 }
 
+/* A seed as text or number: 42, "42", "0x2A". */
+static uint64_t seed_of(const cJSON *value) {
+    const char *text = cJSON_GetStringValue(value);
+    return text ? strtoull(text, NULL, strncmp(text, "0x", 2) == 0 ? 16 : 10)
+                : (uint64_t)cJSON_GetNumberValue(value);
+}
+
 /* True if a value is that which its key has when it is left out. */
 static bool is_default(const bst_config_desc *desc, const cJSON *value) {
     if (!desc || !desc->fallback) {
@@ -192,7 +199,8 @@ static bool is_default(const bst_config_desc *desc, const cJSON *value) {
         return true;
     }
     cJSON *fallback = cJSON_Parse(desc->fallback);
-    bool same = cJSON_Compare(value, fallback, true);
+    bool same = desc->type == BST_CONFIG_SEED ? seed_of(value) == seed_of(fallback)
+                                              : cJSON_Compare(value, fallback, true);
     cJSON_Delete(fallback);
     return same;
 }
