@@ -184,7 +184,7 @@ static uint64_t seed_of(const cJSON *value) {
                 : (uint64_t)cJSON_GetNumberValue(value);
 }
 
-/* True if a value is that which its key has when it is left out. */
+/* True if a value equals the default of its key. */
 static bool is_default(const bst_config_desc *desc, const cJSON *value) {
     if (!desc || !desc->fallback) {
         return false;
