@@ -190,7 +190,8 @@ bst_status bst_control_archive(bst_control *c, bst_archive *archive) {
 /* Updates the body attitude and its rate, low-pass filtered against noise of the attitude estimate.
  */
 static void update_body_attitude(bst_control *c, int64_t tick, bst_quat q) {
-    if (c->config.fixed_frame != BST_CONTROL_FIXED_BODY) {
+    if (c->config.strategy != BST_CONTROL_FIXED ||
+        c->config.fixed_frame != BST_CONTROL_FIXED_BODY) {
         return;
     }
     if (c->pointing_valid && tick > c->body_tick) {

@@ -583,7 +583,7 @@ const bst_module_desc bst_obsgen_module = {
     .doc =
         "Makes detections from the truth, by the statistics of rendering and image processing, "
         "where observation_source is generator.",
-    .flags = BST_MODULE_READS_TRUTH,
+    .flags = BST_MODULE_READS_TRUTH | BST_MODULE_INPUTS_ONLY,
     .config = config_table,
     .config_bytes = sizeof(obsgen_config),
     .default_rate_hz = 0.0,

@@ -55,6 +55,9 @@ enum {
         1u << 5, /* BST_MODULE_MULTI_SENSOR with a lookahead (bst_step_set_lookahead), so that
                sensors may run ahead. It has a period, never requests a
                wake, and reads its queues to the end in each step */
+    BST_MODULE_INPUTS_ONLY = 1u << 6, /* steps on its inputs and wakes alone: it has no period, and
+                                         rate_hz and offset_s of a scenario have no effect. So it
+                                         is with BST_MODULE_DEFERRABLE */
 };
 
 /* One of the sensors that a BST_MODULE_MULTI_SENSOR module serves. */

@@ -89,9 +89,9 @@ class FormerNames(unittest.TestCase):
 
     def test_overrides(self):
         former = self.check("check", runs.TRACK, "--set", CAMERA + "/detector/hits/rate_per_cm2_s=5", "--set",
-                            TRACKER + "/memory_s=60", "--set", CAMERA + '/detector/hits={"frame_s": 0.5}', warnings=4)
+                            TRACKER + "/memory_s=60", "--set", CAMERA + '/detector/hits={"frame_s": 0.5, "rate_per_cm2_s": 5}', warnings=4)
         present = runs.call_well("check", runs.TRACK, "--set", CAMERA + "/detector/cosmic_rays/rate_per_cm2_s=5", "--set",
-                                 TRACKER + "/max_dormant_s=60", "--set", CAMERA + '/detector/cosmic_rays={"readout_s": 0.5}')
+                                 TRACKER + "/max_dormant_s=60", "--set", CAMERA + '/detector/cosmic_rays={"readout_s": 0.5, "rate_per_cm2_s": 5}')
         self.assertEqual(former, present)
         self.assertIn('"max_dormant_s"', former)
         self.assertNotIn('"memory_s"', former)

@@ -7,6 +7,7 @@
 #include "sim/analysis/check/check_bodies.h"
 #include "sim/analysis/check/check_burns.h"
 #include "sim/analysis/check/check_reach.h"
+#include "sim/analysis/check/no_effect.h"
 #include "sim/analysis/loop/loop_model.h"
 #include "sim/engine/scenario/loop_timing.h"
 #include "sim/world/world_config.h"
@@ -105,6 +106,12 @@ static bst_status old_elements(bst_ctx *ctx, const bst_scenario *scenario, const
 static bst_status predicted_earth(bst_ctx *ctx, const bst_scenario *scenario,
                                   const bst_world *world) {
     bst_world_warn_earth_orientation(ctx, scenario->file, world, scenario->duration_s);
+    return BST_OK;
+}
+
+static bst_status no_effect(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world) {
+    (void)world;
+    bst_no_effect_warn(ctx, scenario);
     return BST_OK;
 }
 
@@ -336,6 +343,11 @@ static const rule rules[] = {
      NULL, wide_field, NULL},
     {"replaced", "psf_fwhm_px beside ensquared_energy, throughput or flux beside zero_point_mag",
      NULL, replaced_figures, NULL},
+    {"no_effect",
+     "keys that have no effect because of another: distortion on board without "
+     "override_distortion, "
+     "rate_hz of a module that steps on its inputs",
+     no_effect, NULL, NULL},
     {"short_times", "times of tracker and control that are over before the frames they wait for",
      NULL, short_times, NULL},
     {"loops", "loops that are unstable or have thin margins", NULL, NULL, loops},

@@ -235,6 +235,10 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json,
     memset(out, 0, sizeof *out);
     BST_TRY(check_extended(ctx, json));
     BST_TRY(bst_config_read(ctx, json, bst_json_root(json), "", bst_scenario_table, out));
+    out->written = cJSON_Duplicate(bst_json_root(json), true);
+    if (!out->written) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a scenario");
+    }
     snprintf(out->file, sizeof out->file, "%s", bst_json_name(json));
     bst_scenario_folder(out->file, out->base_dir, sizeof out->base_dir);
     char address[BST_LINK_ENDPOINT_BYTES];
@@ -293,6 +297,7 @@ void bst_scenario_free(bst_scenario *s) {
     }
     free(s->modules);
     free(s->plugins);
+    cJSON_Delete(s->written);
     bst_config_free(bst_scenario_table, s);
     memset(s, 0, sizeof *s);
 }

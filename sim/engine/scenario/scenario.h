@@ -38,8 +38,8 @@ typedef struct bst_scenario_module_config {
     int observer, sensor; /* -1: a multi-sensor module */
     char name[64];        /* key in the block; equals the role of the built-in modules */
     const bst_module_desc *desc;
-    void *config;   /* desc->config_bytes, filled */
-    double rate_hz; /* 0: stepped by triggers only */
+    void *config;                  /* desc->config_bytes, filled */
+    double given_rate_hz, rate_hz; /* as the block gives it; as used, 0: stepped by triggers only */
     double offset_s;
     int64_t period_ticks, offset_ticks;
     bst_input_delay delays[BST_MAX_DELAYS];
@@ -70,8 +70,10 @@ typedef struct bst_scenario {
     bst_pacing_config pacing;
     bst_config_list changes; /* bst_scenario_change, in the order of time */
     /* set by bst_scenario_read, not by the configuration table */
-    char file[512];     /* name for messages */
-    char base_dir[512]; /* base folder of relative paths */
+    struct cJSON *written; /* the document with the values that it gives, in present names; NULL:
+                              not read from a document */
+    char file[512];        /* name for messages */
+    char base_dir[512];    /* base folder of relative paths */
     bst_time epoch;
     int64_t duration_ticks;
     bst_scenario_module_config *modules;

@@ -7,6 +7,10 @@
 /* Configuration keys common to all modules (scenario_modules.c). */
 extern const bst_config_desc bst_module_common_table[];
 
+/* True if a module has no period: rate_hz and offset_s of its block have no effect
+ * (scenario_modules.c). */
+bool bst_module_steps_on_inputs(const bst_module_desc *module);
+
 /* Folder of a file, the base of its relative paths. */
 void bst_scenario_folder(const char *file, char *folder, size_t bytes);
 

@@ -21,13 +21,17 @@ const bst_config_desc bst_module_common_table[] = {
                "A shared library that has this module, relative to the folder of the file that "
                "says so; \"type\" may be left out where it has one of the role."),
     BST_REAL(common_config, rate_hz, "Hz", 0, 1e6, "0",
-             "Steps per second; 0: the module's default."),
-    BST_REAL(common_config, offset_s, "s", 0, 1e9, "0", "Time of the first step."),
+             "Steps per second, of modules that step by the clock; 0: the module's default."),
+    BST_REAL(common_config, offset_s, "s", 0, 1e9, "0", "Time of the first step by the clock."),
     {.key = "delay_s",
      .type = BST_CONFIG_RAW,
      .doc = "Seconds after which what arrives on an input is seen, by channel."},
     BST_CONFIG_END,
 };
+
+bool bst_module_steps_on_inputs(const bst_module_desc *module) {
+    return module->flags & (BST_MODULE_INPUTS_ONLY | BST_MODULE_DEFERRABLE);
+}
 
 /* True if the key is one that every module block has. */
 static bool is_common(const char *key) {
@@ -261,7 +265,10 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json,
                                     true);
     }
     if (status == BST_OK) {
-        module->rate_hz = common.rate_hz > 0.0 ? common.rate_hz : module->desc->default_rate_hz;
+        module->given_rate_hz = common.rate_hz;
+        module->rate_hz = bst_module_steps_on_inputs(module->desc) ? 0.0
+                          : common.rate_hz > 0.0                   ? common.rate_hz
+                                                                   : module->desc->default_rate_hz;
         module->offset_s = common.offset_s;
         if (module->rate_hz > 0.0 && bst_period_ticks(ctx, scenario->tick_rate_hz, module->rate_hz,
                                                       &module->period_ticks) != BST_OK) {

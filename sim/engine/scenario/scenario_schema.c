@@ -4,6 +4,16 @@
 
 #include "sim/engine/scenario/scenario_internal.h"
 
+/* Says of keys of a module that steps on its inputs alone that they have no effect. */
+static void describe_steps(const bst_module_desc *m, cJSON *properties) {
+    static const char *const keys[] = {"rate_hz", "offset_s"};
+    for (int i = 0; i < 2 && bst_module_steps_on_inputs(m); i++) {
+        cJSON_ReplaceItemInObjectCaseSensitive(
+            cJSON_GetObjectItemCaseSensitive(properties, keys[i]), "description",
+            cJSON_CreateString("No effect: this module steps when its inputs come."));
+    }
+}
+
 /* JSON Schema of one module: its own keys, the common keys and a fixed "type". `plugin`: the block
  * names a plug-in by "plugin", "type" or both. */
 static cJSON *module_schema(const bst_module_desc *m, bool plugin) {
@@ -18,6 +28,7 @@ static cJSON *module_schema(const bst_module_desc *m, bool plugin) {
         cJSON_AddItemToObject(properties, item->string, item);
     }
     cJSON_Delete(common);
+    describe_steps(m, properties);
     cJSON *type = cJSON_GetObjectItemCaseSensitive(properties, "type");
     cJSON_DeleteItemFromObjectCaseSensitive(type, "maxLength");
     cJSON_DeleteItemFromObjectCaseSensitive(type, "default");
