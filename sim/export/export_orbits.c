@@ -209,11 +209,12 @@ static int64_t rows_end(track *t, bst_ctx *ctx, int64_t row, int64_t rows) {
     return row;
 }
 
-/* Writes an orbit between two times at which it may change, in pieces where it does not exist
- * (decay, end of a file). A piece of few rows is written on a finer grid. why: the first reason for
- * which there is no state, "": none. */
-static bst_status write_between(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t,
-                                double from_s, double to_s, int *pieces, char *why) {
+/* Writes an orbit between break k and the next, in pieces where it does not exist (decay, end of a
+ * file). A piece of few rows is written on a finer grid. why: the first reason for which there is
+ * no state, "": none. */
+static bst_status write_between(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t, int k,
+                                int *pieces, char *why) {
+    const double from_s = t->breaks[k], to_s = t->breaks[k + 1];
     int64_t rows = begin_piece(t, from_s, to_s);
     for (int64_t row = 0; row < rows;) {
         int64_t end = rows_end(t, ctx, row, rows), count = end - row;
@@ -243,7 +244,7 @@ static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenari
     find_breaks(scenario, e->czml, t);
     for (int k = 0; k + 1 < t->break_count; k++) {
         if (t->breaks[k + 1] > t->breaks[k]) { /* not two burns at the same time */
-            BST_TRY(write_between(ctx, e, stream, t, t->breaks[k], t->breaks[k + 1], &pieces, why));
+            BST_TRY(write_between(ctx, e, stream, t, k, &pieces, why));
         }
     }
     if (*why) {
