@@ -25,12 +25,13 @@ static const double TURN_SIGMA_RAD = 0.2, DEPTH_SIGMA = 0.3, DEPTH_SIGMA_KNOWN =
 static const double SAME_RAD = 0.12;
 /* Gap between frames after which all hypotheses end, s. */
 static const double LONGEST_GAP_S = 60.0;
-/* Frames that the best hypothesis must have followed, and directions that must agree with it. */
+/* Frames that the best hypothesis must have followed. */
 enum { FRAMES_LEAST = 3 };
 /* Rates and changes of range that are none. */
 static const double RATE_MOST_RADPS = 10.0, APPROACH_MOST = 10.0;
 /* Index of the depth among the states. */
 enum { DEPTH = 6 };
+/* Share of an outline's directions in which the best hypothesis must agree with it. */
 static const double INSIDE_LEAST = 0.6;
 /* Cost that a frame should have: independent directions less unknowns. */
 static const double DEGREES_OF_FREEDOM = 6.0;

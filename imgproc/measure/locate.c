@@ -151,6 +151,18 @@ static bool is_shape_ambiguous(const bst_locate_frame *f, const bst_imgproc_foun
     return point * point > best2 - CLEAR_CHI - CLEAR_SHARE * best2;
 }
 
+/* FWHM of a source's image along its longest axis, as it is drawn: that of the PSF, and with an
+ * uneven motion of the camera that of its path. */
+static double drawn_fwhm_px(const bst_locate_frame *f, const bst_imgproc_shape *shape) {
+    if (!f->uneven) {
+        return BST_FWHM_PER_SIGMA * f->sigma_px;
+    }
+    double v[3];
+    bst_imgproc_shape_path_variance(shape, v);
+    const double path = 0.5 * (v[0] + v[2]) + hypot(0.5 * (v[0] - v[2]), v[1]);
+    return BST_FWHM_PER_SIGMA * sqrt(f->sigma_px * f->sigma_px + path);
+}
+
 /* First fit of a source: shape and position. */
 static void fit_shape_and_position(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     const bst_imgproc_locator *l = w->l;
@@ -456,7 +468,7 @@ static void finish_source(const bst_imgproc_worker *w, int i, bst_imgproc_found 
     bst_source_moments_measure(w, i, found, 0.0);
     if (found->streak ||
         (found->snr >= BST_EXTENT_SNR && found->length_px > 1.5 * fmax(found->width_px, 1.0) &&
-         found->length_px > 1.5 * BST_FWHM_PER_SIGMA * f->sigma_px)) {
+         found->length_px > 1.5 * drawn_fwhm_px(f, &found->source.shape))) {
         found->flags |= BST_DETECTION_STREAK;
     }
 }

@@ -165,6 +165,14 @@ static bool differs(const bst_imgproc_shape *own, const bst_imgproc_shape *star,
     return hypot(x, y) > LEAST_OTHER_PX && chi2 > LEAST_OTHER_CHI2;
 }
 
+/* True if stars are streaks, and a path is less than half as long: what nearly moves with the
+ * camera is no streak among them. */
+static bool is_short(const bst_locate_frame *f, const bst_imgproc_shape *own) {
+    bst_imgproc_shape star = *own;
+    bst_peak_centroid_star_path(f, &star);
+    return f->filter->streak && hypot(own->dx_px, own->dy_px) < 0.5 * hypot(star.dx_px, star.dy_px);
+}
+
 void bst_own_path_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     assert(w && found && i >= 0 && i < w->l->count);
     const bst_locate_frame *f = w->f;
@@ -210,6 +218,6 @@ void bst_own_path_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *fou
     add_path_covariance(&a, covariance, &found->source);
     found->own_path = true;
     found->streak = before.length_px >= BST_OWN_STREAK_LENGTH * psf_fwhm &&
-                    at.chi_square < old_chi - BST_OWN_STREAK_GAIN;
+                    at.chi_square < old_chi - BST_OWN_STREAK_GAIN && !is_short(f, &at.source.shape);
     found->snr = found->source.flux_e * bst_fit_norm(w->fit, &s.stamp) / found->noise_e;
 }
