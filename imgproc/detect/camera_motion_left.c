@@ -5,9 +5,6 @@
 
 /* Drift of the camera unknown to the telemetry, px per exposure. */
 static const double DRIFT_PX = 1.0;
-/* The same where no streak measures it, in the covariance: 1 arcsec/s for 0.5 s in pixels of 2
- * arcsec. */
-static const double UNMEASURED_DRIFT_PX = 0.25;
 
 /* 1 sigma per axis of the bend before it is measured on streaks, sensor px. */
 static double unknown_bend_px(const bst_imgproc *ip, const bst_camera_motion *motion) {
@@ -51,22 +48,6 @@ void bst_imgproc_correct_motion(bst_imgproc *ip, double binning, bst_camera_moti
     }
 }
 
-/* Sets the shared displacement where the camera moved unevenly. */
-static void set_uneven_shift(const bst_imgproc *ip, const bst_camera_motion *motion, bool measured,
-                             const bst_camera_motion_unknown *unknown, double sigma_px,
-                             bst_detections *out) {
-    double path[BST_CAMERA_MOTION_KNOTS][2], shared[3];
-    bst_camera_motion_path(motion, &ip->camera, path);
-    bst_camera_motion_unknown left = *unknown;
-    left.covariance = measured ? ip->streak_motion.covariance : NULL;
-    left.ex = ip->streak_motion.ex;
-    left.ey = ip->streak_motion.ey;
-    bst_camera_motion_uneven_shift(path, sigma_px, &left, shared);
-    out->shared_xx = shared[0];
-    out->shared_xy = shared[1];
-    out->shared_yy = shared[2];
-}
-
 void bst_imgproc_set_shared_shift(const bst_imgproc *ip, const bst_camera_motion *motion,
                                   const bst_camera_motion *corrected, bst_detections *out) {
     if (!motion || ip->smeared || !(ip->filter.streak || ip->view.uneven)) {
@@ -82,9 +63,14 @@ void bst_imgproc_set_shared_shift(const bst_imgproc *ip, const bst_camera_motion
     const double binning = ip->view.binning;
     const double sigma = binning * sqrt(ip->view.sigma_px * ip->view.sigma_px + 1.0 / 12.0);
     if (ip->view.uneven) {
-        const bst_camera_motion_unknown unknown = {.bend_px = before,
-                                                   .drift_px = UNMEASURED_DRIFT_PX};
-        set_uneven_shift(ip, corrected ? corrected : motion, corrected, &unknown, sigma, out);
+        const bst_camera_motion_unknown unknown = {
+            .bend_px = before,
+            .drift_px = BST_CAMERA_MOTION_DRIFT_PX,
+            .covariance = corrected ? ip->streak_motion.covariance : NULL,
+            .ex = ip->streak_motion.ex,
+            .ey = ip->streak_motion.ey};
+        bst_camera_motion_set_uneven_shift(corrected ? corrected : motion, &ip->camera, sigma,
+                                           &unknown, out);
         return;
     }
     bst_camera_motion_shared_shift(length, sigma, before, after, &along, &across);

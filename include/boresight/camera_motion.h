@@ -128,6 +128,10 @@ double bst_camera_motion_unknown_bend_px(double jitter_px, double own_px, double
 void bst_camera_motion_shared_shift(double length_px, double sigma_px, double before_px,
                                     double after_px, double *along_px2, double *across_px2);
 
+/* Drift of the camera that no streak measures, 1 sigma per axis, px per exposure: 1 arcsec/s for
+ * 0.5 s in pixels of 2 arcsec. */
+#define BST_CAMERA_MOTION_DRIFT_PX 0.25
+
 /* What is not known of a camera's motion in an exposure. */
 typedef struct bst_camera_motion_unknown {
     double bend_px;  /* 1 sigma per axis of the bend before it is measured on streaks */
@@ -152,6 +156,12 @@ typedef struct bst_camera_motion_unknown {
  * Reference: docs/explanation/equations/image_processing.md, "Motion of the stars" */
 void bst_camera_motion_uneven_shift(const double path[BST_CAMERA_MOTION_KNOTS][2], double sigma_px,
                                     const bst_camera_motion_unknown *unknown, double shared[3]);
+
+/* Sets the shared_xx, shared_xy and shared_yy of detections to those of
+ * bst_camera_motion_uneven_shift for the path of a star near the boresight. */
+void bst_camera_motion_set_uneven_shift(const bst_camera_motion *motion, const bst_camera *camera,
+                                        double sigma_px, const bst_camera_motion_unknown *unknown,
+                                        bst_detections *detections);
 
 /* Sets the shared_xx, shared_xy and shared_yy of detections from variances along and across streaks
  * of direction (dx_px, dy_px). */

@@ -12,7 +12,7 @@ enum { MOST_STARS = 12 };
 static const double LEAST_SNR = 20.0, LEAST_PATH_SIGMAS = 4.0, MOST_BEND = 0.1;
 /* 1 sigma of the telemetry's error of length and direction that image processing expects, px
  * (imgproc/detect/camera_motion_left.c). */
-static const double DRIFT_PX = 1.0, UNMEASURED_DRIFT_PX = 0.25;
+static const double DRIFT_PX = 1.0;
 /* Random stream of the bend's error. */
 static const uint64_t BEND_ERROR = (uint64_t)1 << 55;
 
@@ -107,21 +107,16 @@ void bst_generator_set_shared(const bst_camera_motion *motion, const bst_camera 
     if (!f->followed || made->smeared) {
         return;
     }
-    double path[BST_CAMERA_MOTION_KNOTS][2], shared[3];
-    bst_camera_motion_path(motion, camera, path);
     const double length = hypot(made->shared_dx_px, made->shared_dy_px);
     const double after2 = made->bend_after_px * made->bend_after_px;
     const double covariance[3][3] = {{0.0}, {0.0}, {0.0, 0.0, after2}};
     const bool measured = length > 0.0 && made->bend_after_px < made->bend_before_px;
     const bst_camera_motion_unknown unknown = {.bend_px = made->bend_before_px,
-                                               .drift_px = UNMEASURED_DRIFT_PX,
+                                               .drift_px = BST_CAMERA_MOTION_DRIFT_PX,
                                                .covariance = measured ? covariance : NULL,
                                                .ex = measured ? made->shared_dx_px / length : 1.0,
                                                .ey = measured ? made->shared_dy_px / length : 0.0};
     const double pixel = f->binning > 1 ? f->binning : 1;
     const double sigma = sqrt(f->sigma_px * f->sigma_px + pixel * pixel / 12.0);
-    bst_camera_motion_uneven_shift(path, sigma, &unknown, shared);
-    out->shared_xx = shared[0];
-    out->shared_xy = shared[1];
-    out->shared_yy = shared[2];
+    bst_camera_motion_set_uneven_shift(motion, camera, sigma, &unknown, out);
 }

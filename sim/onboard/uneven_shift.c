@@ -147,3 +147,14 @@ void bst_camera_motion_uneven_shift(const double path[KNOTS][2], double sigma_px
     const double most = sqrt(shared[0] * shared[2]);
     shared[1] = fmax(-most, fmin(0.5 * (total.xy + total.yx), most));
 }
+
+void bst_camera_motion_set_uneven_shift(const bst_camera_motion *motion, const bst_camera *camera,
+                                        double sigma_px, const bst_camera_motion_unknown *unknown,
+                                        bst_detections *detections) {
+    double path[KNOTS][2], shared[3];
+    bst_camera_motion_path(motion, camera, path);
+    bst_camera_motion_uneven_shift(path, sigma_px, unknown, shared);
+    detections->shared_xx = shared[0];
+    detections->shared_xy = shared[1];
+    detections->shared_yy = shared[2];
+}
