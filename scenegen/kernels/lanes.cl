@@ -38,8 +38,9 @@ typedef ushort16 lanes_ushort;
 #endif
 
 /* floor() of lanes by the processor's instruction, where the compiler has it as a function for all
- * vectors; some OpenCL libraries emulate floor() by six. */
-#if !defined(ONE_LANE) && defined(__has_builtin)
+ * vectors; some OpenCL libraries emulate floor() by six. Machines that take SPIR know the functions
+ * of OpenCL alone. */
+#if !defined(ONE_LANE) && !defined(__SPIR__) && !defined(__SPIR64__) && defined(__has_builtin)
 #if __has_builtin(__builtin_elementwise_floor)
 #define FLOOR(x) __builtin_elementwise_floor(x)
 #endif
