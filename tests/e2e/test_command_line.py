@@ -326,6 +326,9 @@ class Help(unittest.TestCase):
         shown = call("version", "--verbose").stdout
         for name, value in all_of_it["libraries"].items():
             self.assertRegex(shown, rf"\n  {name} +{re.escape(value)}\n")
+        with open("docs/reference/file_formats.md", encoding="utf-8") as page:
+            documented = re.search(r"^\| link \|[^|]*\| (\d+) \|", page.read(), re.MULTILINE)[1]
+        self.assertRegex(shown, rf"\nlink_protocol +{documented}\n")
 
 
 class SmallStack(unittest.TestCase):

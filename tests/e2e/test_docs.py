@@ -155,6 +155,21 @@ class Docs(unittest.TestCase):
                     wrong.append(path)
         self.assertEqual(wrong, [])
 
+    def test_headings_are_said_once(self):
+        """No page has two sections of one name on one level of one section (what was moved and not deleted)."""
+        wrong = []
+        for path in ["README.md"] + glob.glob("docs/**/*.md", recursive=True):
+            above, seen = {}, set()
+            for number, line in prose(path):
+                match = re.match(r"(#+) (.*)", line)
+                if match:
+                    level = len(match[1])
+                    above = {k: v for k, v in above.items() if k < level} | {level: match[2]}
+                    place = tuple(above.values())
+                    wrong += [f"{path}:{number}: {match[2]}"] if place in seen else []
+                    seen.add(place)
+        self.assertEqual(wrong, [])
+
     def test_readme_is_short(self):
         with open("README.md", encoding="utf-8") as file:
             self.assertLessEqual(len(file.read().split()), README_WORDS)
