@@ -136,10 +136,8 @@ static double tdb_minus_tt(double jd1, double jd2) {
            0.000010 * t * sin(628.3076 * t + 4.2490);
 }
 
-bst_status bst_ccsds_time(bst_ctx *ctx, const char *text, size_t length,
-                          bst_astro_time_system system, bst_time *out) {
-    double jd1, jd2;
-    BST_TRY(read_jd(ctx, (bst_text_span){text, length}, system == BST_TIME_UTC, &jd1, &jd2));
+bst_status bst_time_from_jd(bst_ctx *ctx, bst_astro_time_system system, double jd1, double jd2,
+                            bst_time *out) {
     switch (system) {
         case BST_TIME_UTC:
             return bst_time_from_utc_jd(ctx, jd1, jd2, out);
@@ -158,6 +156,13 @@ bst_status bst_ccsds_time(bst_ctx *ctx, const char *text, size_t length,
         default:
             return bst_fail(ctx, BST_ERR_ARGUMENT, "time system %d does not exist", (int)system);
     }
+}
+
+bst_status bst_ccsds_time(bst_ctx *ctx, const char *text, size_t length,
+                          bst_astro_time_system system, bst_time *out) {
+    double jd1, jd2;
+    BST_TRY(read_jd(ctx, (bst_text_span){text, length}, system == BST_TIME_UTC, &jd1, &jd2));
+    return bst_time_from_jd(ctx, system, jd1, jd2, out);
 }
 
 bst_status bst_ccsds_utc_jd(bst_ctx *ctx, const char *text, size_t length, double *jd1,

@@ -25,6 +25,11 @@ bool bst_astro_time_system_find(const char *name, size_t length, bst_astro_time_
 bst_status bst_ccsds_time(bst_ctx *ctx, const char *text, size_t length,
                           bst_astro_time_system system, bst_time *out) BST_MUST_CHECK;
 
+/* Converts a two-part Julian date of a time system (quasi-JD for UTC). BST_ERR_RANGE for UTC as
+ * bst_time_from_utc. */
+bst_status bst_time_from_jd(bst_ctx *ctx, bst_astro_time_system system, double jd1, double jd2,
+                            bst_time *out) BST_MUST_CHECK;
+
 /* Parses a CCSDS date in UTC into a quasi-JD in two parts: midnight and fraction of the day. */
 bst_status bst_ccsds_utc_jd(bst_ctx *ctx, const char *text, size_t length, double *jd1,
                             double *jd2) BST_MUST_CHECK;

@@ -20,12 +20,16 @@
 enum { INPUT_BYTES = 64 << 20 };
 
 /* Makes a module external: changes its type; keeps keys that are common to all modules or define
- * how frames are commanded. */
+ * how frames are commanded. One that is external already stays as it is. */
 static void make_external(cJSON *module) {
     static const char *const kept[] = {"rate_hz",  "offset_s",    "delay_s", "exposure_s",
                                        "period_s", "description", "platform"};
     bool control = strcmp(module->string, "control") == 0,
          gimbal = strcmp(module->string, "gimbal") == 0;
+    const char *type = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(module, "type"));
+    if (type && strcmp(type, "external") == 0) {
+        return;
+    }
     for (cJSON *item = module->child, *next; item; item = next) {
         bool keep = false;
         next = item->next;

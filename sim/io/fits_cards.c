@@ -18,8 +18,8 @@ typedef struct scan {
 static const int64_t UNSET = BST_FITS_UNSET;
 
 /* Extracts the value of a card without quotes, comment and surrounding blanks. */
-static void card_value(const char *card, char out[CARD]) {
-    const char *value = card + 10, *end = card + CARD;
+static void value_from(const char *card, size_t column, char out[CARD]) {
+    const char *value = card + column, *end = card + CARD;
     while (value < end && *value == ' ') {
         value++;
     }
@@ -35,6 +35,10 @@ static void card_value(const char *card, char out[CARD]) {
         stop--;
     }
     snprintf(out, CARD, "%.*s", (int)(stop - value), value);
+}
+
+static void card_value(const char *card, char out[CARD]) {
+    value_from(card, 10, out);
 }
 
 /* Fails with the value of a FITS card and the allowed values. */
@@ -182,6 +186,43 @@ bool bst_fits_card_text(const void *header, uint64_t bytes, const char *key, cha
         memcpy(card, cards + at, CARD);
         if (is_key(card, key)) {
             card_value(card, value);
+            return true;
+        }
+        if (is_key(card, "END")) {
+            break;
+        }
+    }
+    return false;
+}
+
+/* Column of the value of a card HIERARCH with these words before the =; 0: it is another card. */
+static size_t hierarch_value(const char *card, const char *words) {
+    const char *at = card + strlen("HIERARCH");
+    for (const char *w = words;; w += strspn(w, " ")) {
+        size_t length = strcspn(w, " "), blanks = strspn(at, " ");
+        at += blanks;
+        if (length == 0) {
+            return *at == '=' ? (size_t)(at + 1 - card) : 0;
+        }
+        if (blanks == 0 || strncmp(at, w, length) != 0) {
+            return 0;
+        }
+        at += length;
+        w += length;
+    }
+}
+
+bool bst_fits_card_hierarch(const void *header, uint64_t bytes, const char *words,
+                            char value[CARD]) {
+    const char *cards = header;
+    words += strncmp(words, "HIERARCH ", 9) == 0 ? 9 : 0;
+    words += strspn(words, " ");
+    for (uint64_t at = 0; bytes - at >= CARD && *words; at += CARD) {
+        char card[CARD + 1] = "";
+        memcpy(card, cards + at, CARD);
+        size_t column = is_key(card, "HIERARCH") ? hierarch_value(card, words) : 0;
+        if (column > 0) {
+            value_from(card, column, value);
             return true;
         }
         if (is_key(card, "END")) {

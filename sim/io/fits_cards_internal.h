@@ -31,6 +31,10 @@ bst_status bst_fits_read_cards(bst_ctx *ctx, const char *name, int hdu, const vo
 /* Value of a header key as text, without quotes and comment; false: no such key. */
 bool bst_fits_card_text(const void *header, uint64_t bytes, const char *key,
                         char value[BST_FITS_CARD]);
+/* Value, as text, of a card of ESO's HIERARCH convention: `words` before the = with blanks between
+ * them, as "ESO DET EXPTIME", with or without HIERARCH; false: no such card. */
+bool bst_fits_card_hierarch(const void *header, uint64_t bytes, const char *words,
+                            char value[BST_FITS_CARD]);
 /* Value of a header key as an integer of at most 18 digits; false: no such key or no integer. */
 bool bst_fits_card_int(const void *header, uint64_t bytes, const char *key, int64_t *value);
 

@@ -280,7 +280,11 @@ static void convert_row(const bst_fits_source_hdu *h, const uint8_t *row, float 
             out[x] = (float)(h->zero + h->scale * bst_fits_source_real_at(at, width));
         } else {
             int64_t v = bst_fits_source_integer_at(at, width);
-            out[x] = h->has_blank && v == h->blank ? NAN : (float)(h->zero + h->scale * (double)v);
+            /* 64 bits without sign are stored minus 2^63, where doubles are 1024 apart */
+            double value = h->zero == 0x1p63 && h->scale == 1.0
+                               ? (double)((uint64_t)v ^ (uint64_t)1 << 63)
+                               : h->zero + h->scale * (double)v;
+            out[x] = h->has_blank && v == h->blank ? NAN : (float)value;
         }
     }
 }

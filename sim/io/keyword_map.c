@@ -8,6 +8,8 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/astro/ccsds_time.h"
+
 enum { FORMAT_VERSION = 1 };
 
 #define NUMBER_TABLE(name, doc_)                                                                  \
@@ -25,6 +27,7 @@ enum { FORMAT_VERSION = 1 };
 NUMBER_TABLE(number_table, "the number in the unit of this key");
 
 static const char *const time_formats[] = {"utc", "mjd", "jd", "unix", NULL};
+static const char *const scales[] = {"header", "utc", "tai", "tt", "tdb", "gps", NULL};
 static const char *const moments[] = {"start", "middle", "end", NULL};
 static const char *const attitudes[] = {"none", "wcs", "direction", "quaternion", NULL};
 
@@ -37,8 +40,11 @@ static const bst_config_desc time_table[] = {
     BST_STRING(bst_keyword_time, clock_keyword, "\"\"",
                "Keyword of the time of day, where the keyword above has the date alone."),
     BST_ENUM(bst_keyword_time, format, time_formats, "\"utc\"",
-             "utc: YYYY-MM-DDThh:mm:ss[.f]; mjd, jd: (modified) Julian date in UTC; unix: seconds "
+             "utc: YYYY-MM-DDThh:mm:ss[.f]; mjd, jd: (modified) Julian date; unix: seconds of UTC "
              "from 1970-01-01, without leap seconds."),
+    BST_ENUM(bst_keyword_time, scale, scales, "\"header\"",
+             "Time scale of the dates; header: the one that the keyword TIMESYS names, UTC without "
+             "it. A Z behind a date says UTC."),
     BST_ENUM(bst_keyword_time, moment, moments, "\"start\"", "Part of the exposure that it is."),
     BST_CONFIG_END};
 
@@ -147,6 +153,13 @@ static bst_status read_map(bst_ctx *ctx, const char *path, bst_json **json, bst_
     if (status == BST_OK && !*out->time.keyword) {
         status =
             bst_fail(ctx, BST_ERR_CONFIG, "%s: /time/keyword: is empty (allowed: a keyword)", path);
+    }
+    if (status == BST_OK && out->time.format == BST_KEYWORD_UNIX &&
+        out->time.scale > 1 + BST_TIME_UTC) {
+        status = bst_fail(ctx, BST_ERR_CONFIG,
+                          "%s: /time/scale: is not for the format unix, which is in UTC (allowed: "
+                          "header, utc)",
+                          path);
     }
     snprintf(out->file, sizeof out->file, "%s", path);
     return status;

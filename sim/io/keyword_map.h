@@ -19,12 +19,15 @@ typedef struct bst_keyword_number {
 } bst_keyword_number;
 
 enum { BST_KEYWORD_UTC, BST_KEYWORD_MJD, BST_KEYWORD_JD, BST_KEYWORD_UNIX };
+/* Time scale of the header's keyword TIMESYS, UTC without it. */
+enum { BST_KEYWORD_TIMESYS };
 enum { BST_KEYWORD_START, BST_KEYWORD_MIDDLE, BST_KEYWORD_END };
 
 typedef struct bst_keyword_time {
     char keyword[BST_KEYWORD_TEXT];
     char clock_keyword[BST_KEYWORD_TEXT]; /* time of day, where `keyword` has a date alone */
     int32_t format;                       /* BST_KEYWORD_UTC, _MJD, _JD, _UNIX */
+    int32_t scale;                        /* BST_KEYWORD_TIMESYS, or 1 + bst_astro_time_system */
     int32_t moment;                       /* BST_KEYWORD_START, _MIDDLE, _END */
 } bst_keyword_time;
 

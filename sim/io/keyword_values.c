@@ -1,10 +1,12 @@
 /* Values of a frame's header by a keyword map. */
 #include <assert.h>
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/astro/ccsds_time.h"
 #include "sim/io/keyword_values_internal.h"
 
 /* Most entries of a history of rates, and the least that give a trend. */
@@ -117,6 +119,56 @@ static bst_status read_vector(const bst_keyword_reading *r, const bst_keyword_ve
     return bst_keyword_read_number(r, &v->z, allowed, &out->z);
 }
 
+/* Time scale of the dates. TIMESYS by FITS 4.0, section 9.2.1 and table 30: a realisation may
+ * follow in parentheses, TT has the former names TDT and ET, TAI the former IAT, UTC the former UT
+ * and GMT.
+ */
+static bst_status read_scale(const bst_keyword_reading *r, const char *date,
+                             bst_astro_time_system *out) {
+    static const char *const former[][2] = {
+        {"TDT", "TT"}, {"ET", "TT"}, {"IAT", "TAI"}, {"UT", "UTC"}, {"GMT", "UTC"}};
+    const bst_keyword_time *t = &r->map->time;
+    char text[BST_FITS_SOURCE_TEXT], what[240];
+    *out = t->scale == BST_KEYWORD_TIMESYS ? BST_TIME_UTC : (bst_astro_time_system)(t->scale - 1);
+    size_t length = strlen(date);
+    if (t->scale != BST_KEYWORD_TIMESYS || t->format == BST_KEYWORD_UNIX ||
+        (length > 0 && date[length - 1] == 'Z') || !bst_keyword_find(r, "TIMESYS", text) ||
+        !*text) {
+        return BST_OK;
+    }
+    snprintf(
+        what, sizeof what,
+        "names a time scale that is not read (found \"%.40s\"; allowed: UTC, TAI, TT, TDB, GPS, "
+        "or a map with time/scale)",
+        text);
+    text[strcspn(text, "(")] = '\0';
+    for (char *c = text; *c; c++) {
+        *c = *c == ' ' ? '\0' : (char)toupper((unsigned char)*c);
+    }
+    const char *name = text;
+    for (size_t i = 0; i < sizeof former / sizeof *former; i++) {
+        name = strcmp(text, former[i][0]) == 0 ? former[i][1] : name;
+    }
+    return bst_astro_time_system_find(name, strlen(name), out)
+               ? BST_OK
+               : bst_keyword_wrong(r, "TIMESYS", "time", what);
+}
+
+/* Time of a date in text. */
+static bst_status time_of_date(bst_ctx *ctx, const char *date, bst_astro_time_system scale,
+                               bst_time *out) {
+    return scale == BST_TIME_UTC ? bst_time_from_utc(ctx, date, out)
+                                 : bst_ccsds_time(ctx, date, strlen(date), scale, out);
+}
+
+/* Whether a time lies in the years for which UTC is accepted. */
+static bst_status check_years(bst_ctx *ctx, bst_time t) {
+    double jd1, jd2;
+    bst_time same;
+    bst_time_utc(t, &jd1, &jd2);
+    return bst_time_from_utc_jd(ctx, jd1, jd2, &same);
+}
+
 /* Time of the start of the exposure. */
 static bst_status read_time(const bst_keyword_reading *r, double exposure_s, bst_time *out) {
     const bst_keyword_time *t = &r->map->time;
@@ -125,6 +177,7 @@ static bst_status read_time(const bst_keyword_reading *r, double exposure_s, bst
     double date;
     bst_ctx unheard = {0};
     bst_status status;
+    bst_astro_time_system scale;
     if (!bst_keyword_find(r, t->keyword, text)) {
         return bst_keyword_wrong(r, t->keyword, "time",
                                  "is missing (allowed: a header or side table with it)");
@@ -136,7 +189,8 @@ static bst_status read_time(const bst_keyword_reading *r, double exposure_s, bst
         bool apart =
             !strchr(text, 'T') && *t->clock_keyword && bst_keyword_find(r, t->clock_keyword, clock);
         snprintf(both, sizeof both, "%s%s%s", text, apart ? "T" : "", apart ? clock : "");
-        status = bst_time_from_utc(&unheard, both, out);
+        BST_TRY(read_scale(r, both, &scale));
+        status = time_of_date(&unheard, both, scale, out);
     } else if (!bst_keyword_number_of(text, &date)) {
         snprintf(what, sizeof what, "is no number (found \"%.60s\")", text);
         return bst_keyword_wrong(r, t->keyword, "time", what);
@@ -146,8 +200,13 @@ static bst_status read_time(const bst_keyword_reading *r, double exposure_s, bst
                                       (date - BST_DAY_S * days) / BST_DAY_S, out);
     } else {
         double whole = floor(date);
-        status = bst_time_from_utc_jd(
-            &unheard, (t->format == BST_KEYWORD_MJD ? 2400000.5 : 0.0) + whole, date - whole, out);
+        BST_TRY(read_scale(r, "", &scale));
+        status = bst_time_from_jd(&unheard, scale,
+                                  (t->format == BST_KEYWORD_MJD ? 2400000.5 : 0.0) + whole,
+                                  date - whole, out);
+    }
+    if (status == BST_OK) {
+        status = check_years(&unheard, *out);
     }
     if (status != BST_OK) {
         snprintf(what, sizeof what, "is no time: %.200s", unheard.message);

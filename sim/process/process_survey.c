@@ -46,6 +46,15 @@ static bst_status read_frame(bst_ctx *ctx, bst_process *p, int64_t index, bst_pr
                                    r.place.hdu > 0 ? "NAXIS1 and NAXIS2 give" : "the picture has",
                                    r.width, r.height, p->width, p->height));
     }
+    if (r.values.exposure_s <= 0.0) {
+        char name[BST_KEYWORD_TEXT];
+        return fail_frame(ctx, f,
+                          bst_fail(ctx, BST_ERR_FORMAT,
+                                   "%s (exposure_s of the map %s) gives 0 (allowed: above 0)",
+                                   bst_keyword_name(bst_recorded_frames_source(p->recorded),
+                                                    p->map.exposure_s.keyword, name),
+                                   p->map.name));
+    }
     BST_TRY(bst_keyword_attitude(ctx, &p->map, bst_recorded_frames_source(p->recorded), &r.place,
                                  bst_recorded_flips(&p->options), &f->has_header_attitude,
                                  &f->q_header));

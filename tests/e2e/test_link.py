@@ -92,9 +92,14 @@ class Replay(unittest.TestCase):
         address, out = f"tcp://127.0.0.1:{free_port()}", runs.scratch() + "/run"
         parts = "imgproc,tracker,control"
         peers = [serve(runs.TRACK, address, part) for part in parts.split(",")]
-        ended(start_run(runs.TRACK, out, address, parts, duration=6))
+        # one is external already: --external leaves its keys
+        ended(start_run(runs.TRACK, out, address, parts, "--set",
+                        runs.SENSOR + '/modules/tracker={"type": "external", "max_items": 77}', duration=6))
         for peer in peers:
             ended(peer)
+        with open(out + "/scenario.json", encoding="utf-8") as file:
+            modules = json.load(file)["observers"][0]["sensors"][0]["modules"]
+        self.assertEqual((modules["imgproc"]["max_items"], modules["tracker"]["max_items"]), (2048, 77))
         again, result = self.replayed(runs.TRACK, out, "--external", parts)
         self.assertEqual(result.returncode, 1)  # no address, which even a replay's scenario has
         again, result = self.replayed(out + "/scenario.json", out)

@@ -136,6 +136,14 @@ class Recorded(unittest.TestCase):
             json.dump(keys, file)
         self.fails(self.recorded(frames, wrong),
                    says=["frames.fits: HDU 2: EXPOSED (exposure_s of the map boresight): is missing"])
+        dark = self.path("dark.fits")
+        shutil.copy(frames, dark)
+        with fits.open(dark, mode="update", disable_image_compression=True) as file:
+            file[2].header["EXPTIME"] = 0.0
+        result = call("process", dark, "--map", "boresight", "--prepare", "--out", self.path("never"), *SOLVE)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("dark.fits: HDU 3: EXPTIME (exposure_s of the map boresight) gives 0 (allowed: above 0)", result.stderr)
+        self.assertFalse(os.path.exists(self.path("never")))
         self.fails(self.recorded(frames), CAMERA + "width_px=299",
                    says=["frames.fits: HDU 2: NAXIS1 and NAXIS2 give 300 x 300"])
 
