@@ -32,6 +32,17 @@ typedef struct reduction {
     bst_time first_start;
 } reduction;
 
+double bst_frame_stack_level_variance(const bst_frame_stack *s) {
+    double mean = 0.0, sum = 0.0;
+    for (int i = 0; i < s->count; i++) {
+        mean += s->levels[i] / s->count;
+    }
+    for (int i = 0; i < s->count; i++) {
+        sum += (s->levels[i] - mean) * (s->levels[i] - mean);
+    }
+    return s->count > 1 ? sum / (s->count - 1) : 0.0;
+}
+
 void bst_frame_stack_free(bst_frame_stack *s) {
     free(s->levels);
     free(s->mean);

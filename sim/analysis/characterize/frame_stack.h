@@ -57,6 +57,8 @@ bst_status bst_frame_stack_read(bst_ctx *ctx, const char *kind, const char *cons
 bst_status bst_frame_stack_reduce(bst_ctx *ctx, const char *kind, bst_recorded_frames *recorded,
                                   int64_t first, int64_t count, const bst_keyword_map *map,
                                   bst_frame_stack *out) BST_MUST_CHECK;
+/* Variance of the level from frame to frame, DN^2; 0: one frame. */
+double bst_frame_stack_level_variance(const bst_frame_stack *s);
 /* Frees the arrays. */
 void bst_frame_stack_free(bst_frame_stack *stack);
 

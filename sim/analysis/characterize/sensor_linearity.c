@@ -7,24 +7,12 @@
 /* Least significance of a gain that replaces the header's. */
 static const double CERTAIN = 2.0;
 
-/* Variance of the level from frame to frame. */
-static double level_variance(const bst_frame_stack *s) {
-    double mean = 0.0, sum = 0.0;
-    for (int i = 0; i < s->count; i++) {
-        mean += s->levels[i] / s->count;
-    }
-    for (int i = 0; i < s->count; i++) {
-        sum += (s->levels[i] - mean) * (s->levels[i] - mean);
-    }
-    return s->count > 1 ? sum / (s->count - 1) : 0.0;
-}
-
 /* Level and noise of the blocks without light; false: no memory. */
 static bool find_dark(const bst_sensor_stacks *s, const bst_sensor_figures *f,
                       bst_linearity_dark *dark) {
     size_t pixels = (size_t)f->width * (size_t)f->height;
     const bst_sensor_estimate *read = &f->figures[BST_SENSOR_READ_NOISE];
-    *dark = (bst_linearity_dark){.level_variance = level_variance(&s->bias)};
+    *dark = (bst_linearity_dark){.level_variance = bst_frame_stack_level_variance(&s->bias)};
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
         dark->level[k] = f->figures[BST_SENSOR_OFFSET].value;
         dark->variance[k] =
