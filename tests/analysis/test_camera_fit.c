@@ -264,6 +264,51 @@ static void test_photometry(void **state) {
     assert_int_equal(bst_camera_fit_photometry(&ctx, stars, ALL, &fit), BST_ERR_RANGE);
 }
 
+/* Errors against the sums of a line's regression with clusters, written out for a star of several
+ * frames: as many places of equal weight, so that all follows from the means of each star. */
+static void test_photometry_errors(void **state) {
+    (void)state;
+    enum { EACH = 5, OWN = 30 };
+    static bst_camera_fit_star stars[OWN * EACH];
+    for (int shift = 0; shift < 2; shift++) {
+        double x[OWN], y[OWN], mean_x = 0.0, mean_y = 0.0, xx = 0.0, xy = 0.0, in[3] = {0};
+        state_of_draws = 77;
+        for (int i = 0; i < OWN; i++) {
+            x[i] = 2.0 * shift + 1.8 * uniform();
+            double light = pow(10.0, 0.4 * (21.0 + 0.15 * x[i] + 0.04 * normal() - 9.0));
+            for (int k = 0; k < EACH; k++) {
+                stars[i * EACH + k] = (bst_camera_fit_star){.id = i,
+                                                            .v_mag = 9.0,
+                                                            .b_minus_v = x[i],
+                                                            .rate_e_per_s = light,
+                                                            .rate_sigma_e_per_s = 0.001 * light};
+            }
+            y[i] = 9.0 + 2.5 * log10(light);
+            mean_x += x[i] / OWN;
+            mean_y += y[i] / OWN;
+        }
+        for (int i = 0; i < OWN; i++) {
+            xx += pow(x[i] - mean_x, 2.0);
+            xy += (x[i] - mean_x) * (y[i] - mean_y);
+        }
+        for (int i = 0; i < OWN; i++) {
+            double slope = xy / xx, left = y[i] - mean_y - slope * (x[i] - mean_x);
+            double by_zero = 1.0 / OWN - mean_x * (x[i] - mean_x) / xx,
+                   by_slope = (x[i] - mean_x) / xx;
+            in[0] += pow(by_zero * left, 2.0) * OWN / (OWN - 2);
+            in[1] += pow(by_slope * left, 2.0) * OWN / (OWN - 2);
+            in[2] = slope;
+        }
+        bst_ctx ctx = {0};
+        bst_camera_photometry_fit fit;
+        bst_assert_ok(&ctx, bst_camera_fit_photometry(&ctx, stars, OWN * EACH, &fit));
+        bst_assert_close(fit.colour_term, in[2], 1e-6); /* weights are equal to 1e-6 */
+        bst_assert_close(fit.zero_point_mag, mean_y - in[2] * mean_x, 1e-6);
+        bst_assert_close(fit.zero_point_sigma_mag, sqrt(in[0]), 1e-3 * sqrt(in[0]));
+        bst_assert_close(fit.colour_term_sigma, sqrt(in[1]), 1e-3 * sqrt(in[1]));
+    }
+}
+
 /* ---------------------------------------------------------------- width */
 
 static void test_width(void **state) {
@@ -305,6 +350,7 @@ int main(void) {
         cmocka_unit_test(test_scatter_of_unequal_places),
         cmocka_unit_test(test_too_few_stars),
         cmocka_unit_test(test_photometry),
+        cmocka_unit_test(test_photometry_errors),
         cmocka_unit_test(test_width),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

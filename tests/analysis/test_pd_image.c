@@ -62,6 +62,69 @@ static void powers_and_bounds(void **state) {
     bst_psf_free(psf);
 }
 
+/* A long streak after one in another direction: nothing of the light before is left, in stamps that
+ * are wide, high, and square. */
+static void streaks_one_after_another(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_psf *psf = gaussian();
+    bst_pd_image *image;
+    bst_assert_ok(&ctx, bst_pd_image_create(&ctx, psf, 41.0, &image));
+    static const bst_eval_match_target streaks[] = {
+        {200.25, 120.5, 28, 28},   {200.25, 120.5, 0, 40},   {200.25, 120.5, -28, 28},
+        {200.25, 120.5, 40, 0},    {120.5, 90.75, 9, -33},   {120.5, 90.75, 33, 9},
+        {310.07, 44.31, 4.1, 2.3}, {310.0, 44.25, 0.5, -38}, {310.0, 44.25, 0, 0}};
+    for (size_t i = 0; i < sizeof streaks / sizeof *streaks; i++) {
+        const bst_eval_match_target *p = &streaks[i];
+        const bst_eval_bound_source source = {p->x_px, p->y_px, p->dx_px, p->dy_px, SIGMA_PX, 9000};
+        double powers[2], truth[2];
+        bst_pd_image_powers(image, p, powers);
+        bst_assert_ok(&ctx, bst_eval_gaussian_powers(&ctx, &source, truth));
+        bst_assert_close(powers[0], truth[0], 6e-3 * truth[0]); /* points on sixteenths */
+        bst_assert_close(powers[1], truth[1], 12e-3 * truth[1]);
+        const bst_eval_bound_noise noise = {6.0, true};
+        bst_location_bound a, b;
+        bst_assert_ok(&ctx, bst_pd_image_bound(&ctx, image, p, 9000, &noise, &a));
+        bst_assert_ok(&ctx, bst_location_bound_gaussian(&ctx, &source, &noise, 8.0, &b));
+        for (int k = 0; k < 3; k++) {
+            for (int m = 0; m < 3; m++) {
+                double scale = sqrt(b.covariance[k][k] * b.covariance[m][m]);
+                bst_assert_close(a.covariance[k][m], b.covariance[k][m], 0.05 * scale);
+            }
+        }
+    }
+    bst_pd_image_free(image);
+    bst_psf_free(psf);
+}
+
+/* Light of a streak in a region that is not square, cut by it on one side. */
+static void shares_in_a_part(void **state) {
+    (void)state;
+    enum { WIDE = 31, HIGH = 17 };
+    bst_ctx ctx = {0};
+    bst_psf *psf = gaussian();
+    bst_pd_image *image;
+    bst_assert_ok(&ctx, bst_pd_image_create(&ctx, psf, 9.0, &image));
+    static const bst_eval_match_target exact[] = {{300.3, 100.2, 7, 5}, {292.1, 104.7, -3, 6}};
+    for (int i = 0; i < 2; i++) {
+        for (int turned = 0; turned < 2; turned++) {
+            int width = turned ? HIGH : WIDE, height = turned ? WIDE : HIGH;
+            const bst_eval_match_target *p = &exact[i];
+            double work[2 * (WIDE + HIGH)], truth[WIDE * HIGH], got[WIDE * HIGH];
+            const bst_eval_region region = {285, 92, width, height, work};
+            const bst_eval_bound_source source = {p->x_px,  p->y_px,  p->dx_px,
+                                                  p->dy_px, SIGMA_PX, 1};
+            bst_eval_gaussian_shares(&source, &region, truth);
+            bst_pd_image_shares(image, p, 285, 92, width, height, got);
+            for (int k = 0; k < WIDE * HIGH; k++) {
+                bst_assert_close(got[k], truth[k], 1e-4); /* as below */
+            }
+        }
+    }
+    bst_pd_image_free(image);
+    bst_psf_free(psf);
+}
+
 /* Shares at exact places: no sixteenths. */
 static void shares(void **state) {
     (void)state;
@@ -93,7 +156,8 @@ static void shares(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(powers_and_bounds),
-                                       cmocka_unit_test(shares)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(powers_and_bounds), cmocka_unit_test(streaks_one_after_another),
+        cmocka_unit_test(shares_in_a_part), cmocka_unit_test(shares)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

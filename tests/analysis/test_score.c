@@ -1,7 +1,11 @@
 /* Figures of `boresight score` against numbers by hand, brute force and the binomial law. */
 #include <cjson/cJSON.h>
+#include <math.h>
+#include <stdlib.h>
+#include <unistd.h>
 
 #include "boresight/rng.h"
+#include "sim/analysis/score/score.h"
 #include "sim/analysis/score/score_figures.h"
 #include "tests/test_support.h"
 
@@ -264,6 +268,51 @@ static void frame_with_too_many_points_is_refused(void **state) {
     bst_score_points_free(&p);
 }
 
+static void write_csv(char path[BST_TEST_PATH], const char *name, const char *text) {
+    bst_test_template(path, name);
+    int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    assert_int_equal(write(fd, text, strlen(text)), (int)strlen(text));
+    close(fd);
+}
+
+/* What the command prints, of files: limits of SNR and score, of which one side is left out. */
+static void limits_of_the_command(void **state) {
+    (void)state;
+    char truth[BST_TEST_PATH], found[BST_TEST_PATH], *text = NULL;
+    size_t bytes = 0;
+    write_csv(truth, "truth",
+              "frame,x,y,snr\n1,10,10,5\n1,30,10,4.99\n1,50,20,\n2,10,11,9\n2,60,70,2\n");
+    write_csv(found, "found",
+              "frame,x,y,score\n1,10,12,3\n1,31,10,3\n1,50,23,2.5\n2,10,11,2.49\n2,80,8,\n");
+    bst_score_request q = BST_SCORE_REQUEST_DEFAULTS;
+    q.truth = truth;
+    q.resamples = 0;
+    q.least_snr = 5.0;
+    q.least_score = 2.5;
+    FILE *out = open_memstream(&text, &bytes);
+    bst_assert_ok(&ctx, bst_score_run(&ctx, &q, found, out));
+    fclose(out);
+    /* in: true (10, 10), (50, 20) without SNR and (10, 11); found 2 px and 3 px off, and one on an
+     * object that is too faint; false: the last, without a score */
+    assert_non_null(strstr(text, "frames          2 in 1 sequence\n"));
+    assert_non_null(strstr(text, "true points     3, found 2, missed 1\n"));
+    assert_non_null(strstr(text, "found points    3, false 1\n"));
+    assert_non_null(strstr(text, "left out        2 fainter than SNR 5, and 1 found there\n"));
+    assert_non_null(strstr(text, "distance, RMS       2.5495   px\n")); /* sqrt(13 / 2) */
+    free(text);
+    q.least_snr = -(double)INFINITY;
+    q.least_score = -(double)INFINITY;
+    out = open_memstream(&text, &bytes);
+    bst_assert_ok(&ctx, bst_score_run(&ctx, &q, found, out));
+    fclose(out);
+    assert_non_null(strstr(text, "true points     5, found 4, missed 1\n"));
+    assert_null(strstr(text, "left out"));
+    free(text);
+    unlink(truth);
+    unlink(found);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(figures_are_those_by_hand),
@@ -276,6 +325,7 @@ int main(void) {
         cmocka_unit_test(errors_say_where),
         cmocka_unit_test(byte_order_mark_is_no_name),
         cmocka_unit_test(frame_with_too_many_points_is_refused),
+        cmocka_unit_test(limits_of_the_command),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,6 +4,9 @@ import copy
 import json
 import os
 
+import numpy as np
+from astropy.io import fits
+
 ELEMENTS = os.path.abspath("scenarios/catalogue_2022-06.tle")
 SHAPES = os.path.abspath("scenarios/satellites")
 TARGET, EYE = 44801, 39089
@@ -349,4 +352,50 @@ def passing():
     scene["world"]["objects"][0]["burns"] = [{"time_s": 9, "duration_s": 3, "dv_rtn_mps": [2, -5, 3]}]
     scene["world"]["objects"][0]["brightness"] = {"model": "sphere", "specular_fraction": 0.3, "earthshine": True}
     scene.update(name="passing", duration_s=16, record={"frames": "none", "telemetry_hz": 2})
+    return scene
+
+
+def measured():
+    """A small field for `pd`, turned and distorted, with charge that is multiplied."""
+    scene = shipped("neossat_geo_stare")
+    return changed(scene, {"/world/star_catalogue": "embedded", SENSOR + "/camera/width_px": 292, SENSOR + "/camera/height_px": 220,
+                           SENSOR + "/camera/rotation_deg": 31, SENSOR + "/camera/boresight_offset_px": [6, -9],
+                           SENSOR + "/camera/distortion": {"k1": -150, "p1": 0.3}, SENSOR + "/camera/detector": {"em_gain": 3, "clock_induced_e": 20}})
+
+
+def tabulated_psf(path):
+    """Writes a PSF that is longer than it is wide, with a wing at one side, and says how a camera takes it."""
+    y, x = np.mgrid[:49, :41]
+    image = np.exp(-((x - 18) / 4.2)**2 - ((y - 26) / 5.5)**2) + 0.2 * np.exp(-((x - 23) / 6)**2 - ((y - 20) / 6)**2)
+    fits.writeto(path, image.astype(np.float32))
+    return {SENSOR + "/camera/optics": {"psf": "file", "psf_file": path, "psf_oversampling": 5, "file_centre": "array"}}
+
+
+def bent_path(length_px, scale_arcsec):
+    """Attitudes during an exposure beside Orion, and a camera for them."""
+    import test_twin
+    ra, dec = np.radians((84.0, -2.0))
+    middle = test_twin.product(test_twin.rotation(np.array([dec - np.pi / 2, 0, 0])), test_twin.rotation(np.array([0, 0, -ra - np.pi / 2])))
+    path = test_twin.attitudes(np.random.default_rng(5), middle, length_px, np.radians(scale_arcsec / 3600))
+    return path, {"width_px": 84, "height_px": 70, "pixel_scale_arcsec": scale_arcsec, "aperture_m": 0.04, "psf_fwhm_px": 2.2, "full_well_e": 1e6,
+                  "gain_e_per_dn": 4, "dark_current_e_per_s": 30, "detector": {"hot_fraction": 0.002, "dsnu_rms": 0.2}}
+
+
+def sensor():
+    """A sensor with all that darks and bias frames tell: a slow read-out, hot pixels, traps, radiation."""
+    scene = changed(track(), {**SMALL, SENSOR + "/camera/width_px": 236, SENSOR + "/camera/height_px": 172, SENSOR + "/camera/dark_current_e_per_s": 15})
+    scene["observers"][0]["sensors"][0]["camera"]["detector"] = {
+        "dsnu_rms": 0.3, "hot_fraction": 0.004, "readout_s": 3, "output": {"right": True, "top": True}, "row_noise_e": 2, "column_offset_rms_e": 4,
+        "parallel_traps": {"traps_per_px": [0.05, 0.02, 0]}, "serial_traps": {"traps_per_px": [0.03, 0.02, 0]}, "prnu_rms": 0.012, "dead_fraction": 0.002,
+        "cosmic_rays": {"rate_per_cm2_s": 40, "readout_s": 1}, "pick_up": {"amplitude_e": 6, "cycles_per_px": 0.17, "cycles_per_row": -0.06, "phase_deg": 50}}
+    return scene
+
+
+def starry():
+    """Some hundred stars for a camera's calibration."""
+    scene = changed(track(), {**SMALL, "/duration_s": 6, SENSOR + "/camera/aperture_m": 0.3, SENSOR + "/camera/rotation_deg": -37,
+                              SENSOR + "/camera/pixel_scale_arcsec": 14, "/world/faint_stars": "statistical", "/world/faint_limit_v_mag": 14,
+                              SENSOR + "/knowledge/star_catalogue": "embedded", "/record/compression": "none",
+                              SENSOR + "/camera/distortion": {"k1": -40, "p1": 0.2}})
+    scene["name"] = "stars"
     return scene

@@ -61,7 +61,7 @@ class Kept:
     def __init__(self, name):
         self.folder = letters_only(runs.scratch())
         self.columns = kept_columns.Columns((self.folder, os.getcwd()))
-        self.name = name
+        self.name, self.environment = name, {}
 
     def path(self, name):
         return os.path.join(self.folder, name)
@@ -75,6 +75,21 @@ class Kept:
         with open(self.path(name), "w", encoding="utf-8") as file:
             file.write(text)
         return self.path(name)
+
+    def draw_scripts(self):
+        """From here on plots are the scripts that draw them."""
+        folder = self.path("bin")
+        os.mkdir(folder)
+        with open(os.path.join(folder, "gnuplot"), "w", encoding="utf-8") as file:
+            file.write("#!/bin/sh\nscript=$(cat)\nout=$(printf '%s' \"$script\" | sed -n \"s/^set output '\\(.*\\)'$/\\1/p\")\n"
+                       "printf '%s' \"$script\" | grep -v '^set output' > \"$out\"\n")
+            os.fchmod(file.fileno(), 0o755)
+        self.environment["PATH"] = folder + ":" + os.environ["PATH"]
+
+    def add_script(self, name, path):
+        """The script of a plot, drawn after draw_scripts."""
+        with open(path, "rb") as file:
+            self.columns.put_bytes(name, file.read(), ".txt")
 
     def add(self, name, path):
         """A file, or all files of a folder, sorted."""
@@ -91,7 +106,7 @@ class Kept:
 
     def call(self, name, *words, adds=(), text=True):
         """A command: its exit code, what it said, and what it wrote."""
-        result = runs.call(*words, timeout=300, env={**os.environ, "SOURCE_DATE_EPOCH": "1655416800"})
+        result = runs.call(*words, timeout=300, env={**os.environ, "SOURCE_DATE_EPOCH": "1655416800", **self.environment})
         self.columns.put(f"{name} exit", float(result.returncode))
         if text:
             end = ".json" if result.stdout[:1] in ("{", "[") else ".txt"
@@ -368,10 +383,68 @@ def scene_orbits(k):
     k.call("icd", "icd")
 
 
+def scene_measured(k):
+    """Detection, false alarms and location in every form; the same as a study."""
+    k.draw_scripts()
+    scene = kept_scenes.measured()
+    tabulated = k.write("tabulated.json", kept_scenes.changed(scene, kept_scenes.tabulated_psf(k.path("psf.fits"))))
+    gaussian = k.write("gaussian.json", scene)
+    for name, words in (("stars", [tabulated, "--stars", "--star-streak", "7", "--snr", "5:13:4", "--trials", "30", "--false-alarms", "3"]),
+                        ("stack", [gaussian, "--snr", "3:7:4", "--trials", "12", "--stack", "4", "--rates", "2"]),
+                        ("magnitude", [gaussian, "--magnitude", "12:14:1", "--trials", "12", "--module", "--jitter", "0.3"])):
+        k.call(name, "pd", *words, "--empty-frames", "6", "--threads", "1", "--json", k.path("pd.json"), "--plot", k.path("pd.png"), text=False,
+               adds=[k.path("pd.json")])
+        k.add_script(name + " plot", k.path("pd.png"))
+    for name, words in (("pairs", [tabulated, "--trials", "2"]), ("pairs of streaks", [gaussian, "--trials", "4", "--streak", "5"])):
+        k.call(name, "pd", *words, "--pair", "--snr", "60", "--ratio", "2", "--separation", "1.2,1.9", "--false-splits", "0.01", "--threads", "1",
+               "--json", k.path("pd.json"), "--plot", k.path("pd.png"), text=False, adds=[k.path("pd.json")])
+        k.add_script(name + " plot", k.path("pd.png"))
+    k.write("study.json", {"boresight_study": 1, "seed": "0x53", "name": "pd", "kind": "pd", "scenarios": [{"file": gaussian}], "replicates": 2,
+                           "resamples": 100, "pd": {"snr_first": 5, "snr_last": 9, "snr_step": 4, "trials": 12, "false_alarms_per_frame": 4, "empty_frames": 5},
+                           "sweeps": [{"axes": [{"path": kept_scenes.SENSOR + "/camera/read_noise_e", "values": [5, 25]},
+                                                {"path": "/pd/streak_px", "values": [0, 6]}]}]})
+    k.call("study", "study", k.path("study.json"), "--out", k.path("study"), "--quiet", "--workers", "1", text=False)
+    for name in sorted(n for n in os.listdir(k.path("study")) if n.endswith(".csv")):
+        k.add("study " + name, os.path.join(k.path("study"), name))
+
+
+def scene_twin(k):
+    """A frame whose line of sight follows a bent path, and its twin."""
+    path, camera = kept_scenes.bent_path(7.0, 150)
+    import test_twin
+    scenario = test_twin.write_scenario(k.folder, path, camera, "embedded")
+    k.call("source", "run", scenario, "--quiet", "--out", k.path("source"), "--threads", "1", text=False)
+    k.call("twin", "twin", k.path("source"), "--map", "boresight", "--v-limit", "6.5", "--least-snr", "8", "--catalogue", "embedded", "--quiet",
+           "--threads", "1", "--out", k.path("twin.json"), adds=[k.path("twin" + n) for n in (".json", "_path.json", "_psf.fits", "_dark.fits", "_report.json",
+                                                                                                 "_report.html", "_report.png", "_stars.bin")])
+    k.add("twin frames", k.path("twin_run/frames.fits"))
+
+
+def scene_sensor(k):
+    """A sensor and a camera from frames of their own."""
+    k.draw_scripts()
+    scene = k.write("sensor.json", kept_scenes.sensor())
+    for folder, words in (("cal", ["--bias", "4", "--dark", "5", "--flat", "4"]),
+                          ("warm", ["--bias", "0", "--dark", "4", "--flat", "0", "--set", kept_scenes.SENSOR + "/camera/dark_current_e_per_s=40"])):
+        k.call(folder, "calframes", scene, "--out", k.path(folder), "--exposure", "4", "--threads", "1", *words)
+    names = {f"{folder} {n.rsplit('_', 1)[1][:-5]}": os.path.join(k.path(folder), n) for folder in ("cal", "warm") for n in os.listdir(k.path(folder))}
+    for name, words in (("darks", ["--dark", names["cal dark"], "--pitch", "9"]),
+                        ("bias", ["--bias", names["cal bias"], "--simulated", names["cal bias"]]),
+                        ("all", ["--dark", names["cal dark"], "--bias", names["cal bias"], "--flat", names["cal flat"], "--warm", names["warm dark"],
+                                 "--warmer", "8", "--simulated", names["cal dark"], "--extends", scene])):
+        k.call(name, "characterize", "--map", "boresight", *words, "--out", k.path(name), adds=[k.path(name)])
+        k.add_script(name + " plot", os.path.join(k.path(name), "plot.png"))
+    k.run("stars", kept_scenes.starry())
+    k.call("camera", "calibrate-camera", k.path("stars"), "--out", k.path("camera"), "--psf-columns", "1", "--psf-rows", "1", "--psf-radius", "7",
+           adds=[k.path("camera")])
+    k.call("images and generator", "calibrate-obsgen", "--check", k.path("stars.json"), "--seeds", "2", "--duration", "3", "--json", k.path("check.json"),
+           "--threads", "1", adds=[k.path("check.json")])
+
+
 SCENES = {name[len("scene_"):]: function for name, function in sorted(globals().items()) if name.startswith("scene_")}
 # quick ones and those that are odd in the most ways first
 ORDER = ["unlike", "restored", "orbits", "unlike_derived", "charge", "tasking", "oem", "rolling", "wide", "visible", "infrared", "passing", "studies",
-         "linked", "files", "lost", "search", "rate", "recorded"]
+         "measured", "sensor", "twin", "linked", "files", "lost", "search", "rate", "recorded"]
 
 
 def kept_path(name):

@@ -66,6 +66,46 @@ class Rules(unittest.TestCase):
             self.assertIn(words, said.stderr, rule)
             self.assertIn("warning", said.stderr, rule)
 
+    def test_limits_have_two_sides(self):
+        """What is just allowed is not warned of; what is just beyond is, with its numbers. The period is 1 s, or as long as the exposure."""
+        exposure, tracker, control = runs.SENSOR + "/exposure/", MODULES + "/tracker/", MODULES + "/control/"
+        # key, just allowed, just beyond, words
+        limits = [("/world/objects/0/burns", '[{"time_s": 99.9, "dv_rtn_mps": [0, 0.01, 0]}]', '[{"time_s": 100, "dv_rtn_mps": [0, 0.01, 0]}]',
+                   "/world/objects/0/burns/0/time_s: the burn at 100 s is after the run's end at 100 s"),
+                  (exposure + "first_s", 98.9, 99.6, "first exposure, from 99.6 s, ends at 100.7 s, after the run's end at 100 s"),
+                  (exposure + "dropped_fraction", 0.999, 1, "1 loses every frame"),
+                  (exposure + "exposure_s", 1, 1.1, "an exposure_s of 1.1 s is longer than the period_s of 1 s"),
+                  (control + "exposure_s", 1, 1.1, ""),
+                  (tracker + "initiation_gap_s", 1, 1.09, "initiation_gap_s: 1.09 s is shorter than frames allow (1.1 s here): no track can begin"),
+                  (tracker + "max_coast_s", 1, 1.09, "max_coast_s: 1.09 s is shorter than frames allow (1.1 s here): every track ends"),
+                  (control + "dwell_frames", 4, 4, ""),
+                  (control + "dwell_timeout_s", 5, 5.49, "dwell_timeout_s: 5.49 s is shorter than frames allow (5.5 s here)"),
+                  (tracker + "confirm_hits", 3, 3, ""),
+                  (control + "acquire_timeout_s", 3, 3.29, "acquire_timeout_s: 3.29 s is shorter than frames allow (3.3 s here)"),
+                  # half a diagonal of 724.08 px is 37.5 degrees at 218.6 arcsec
+                  (runs.SENSOR + "/camera/pixel_scale_arcsec", 218, 219, "the field's diagonal is 75 degrees")]
+        for side in (1, 2):
+            sets = [w for limit in limits for w in ("--set", f"{limit[0]}={limit[side]}")]
+            said = check(runs.TRACK, "--quiet", "--set", runs.GENERATOR, "--set", "/duration_s=100", *sets)
+            self.assertEqual(said.returncode, 0, said.stderr)
+            for _, _, _, words in limits:
+                if words and side == 2:
+                    self.assertIn(words, said.stderr)
+                elif words:
+                    self.assertNotIn(re.split(r"[\d.]+ s|1 loses|\d+ degrees", words.split(": ")[-1])[0].strip() or words, said.stderr)
+
+    def test_thin_margins_are_those_of_the_loop(self):
+        override = MODULES + '/control/compensator={"type": "pi", "crossover_hz": 0.07, "phase_margin_deg": 45, "gain_scale": 3}'
+        said = check(runs.TRACK, "--quiet", "--set", runs.GENERATOR, "--set", override).stderr
+        warned = re.findall(r"the (\S+) axis (?:is unstable|has thin margins).*?: gain margin ([-\d.einf]+) dB, phase margin ([-\d.einf]+) deg, "
+                            r"sensitivity peak ([-\d.einf]+)", said)
+        self.assertTrue(warned, said)
+        axes = {axis["axis"]: axis for axis in
+                json.loads(runs.call("loop", runs.TRACK, "--set", override, "--json", "-").stdout)["sensors"][0]["axes"]}
+        for axis, *numbers in warned:
+            for number, key in zip(numbers, ("gain_margin_db", "phase_margin_deg", "sensitivity_peak")):
+                self.assertAlmostEqual(float(number), axes[axis][key], delta=0.006 * abs(axes[axis][key]))  # three digits
+
     def test_times_out_of_reach(self):
         """When the cue enters and leaves the cones about Sun and Moon and goes behind the Earth, by SGP4 and ERFA: 0.02 degrees
         of aberration, 0.2 of the Earth's figure. The Moon's parallax is a degree."""
