@@ -26,6 +26,21 @@ static void count_log(void *user, bst_log_level level, const char *message) {
     logged += level == BST_LOG_WARNING;
 }
 
+/* Renaming to this name, or from a name that ends so, fails; NULL: none does. */
+static const char *no_name, *no_ending;
+
+int __real_rename(const char *from, const char *to);
+int __wrap_rename(const char *from, const char *to);
+int __wrap_rename(const char *from, const char *to) {
+    size_t length = strlen(from), tail = no_ending ? strlen(no_ending) : 0;
+    if ((no_name && strcmp(to, no_name) == 0) ||
+        (tail && length > tail && strcmp(from + length - tail, no_ending) == 0)) {
+        errno = EIO;
+        return -1;
+    }
+    return __real_rename(from, to);
+}
+
 /* The only value of a query on a database file, as text in `out`. */
 static void query(const char *path, const char *sql, char *out, size_t bytes) {
     sqlite3 *db;
@@ -254,6 +269,37 @@ static void test_name_taken_meanwhile(void **state) {
     scratch_remove(&s);
 }
 
+/* A finished run that cannot take its name stays beside the former one, which keeps its own; where
+ * that cannot be renamed back, a warning says where it is. */
+static void test_former_run_stays(void **state) {
+    (void)state;
+    scratch s;
+    scratch_make(&s);
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, count_log, NULL, BST_LOG_INFO);
+    bst_run *run;
+    char out[600];
+    snprintf(out, sizeof out, "%s/run", s.folder);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, out, false, &run));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
+    write_file(scratch_path(&s, "run/former"), "x");
+    for (int back = 1; back >= 0; back--) {
+        logged = 0;
+        bst_assert_ok(&ctx, bst_run_create(&ctx, out, true, &run));
+        int before = logged;
+        no_ending = back ? ".partial" : NULL;
+        no_name = back ? NULL : out;
+        assert_int_equal(bst_run_finish(&ctx, run), BST_ERR_IO);
+        no_name = no_ending = NULL;
+        assert_non_null(strstr(ctx.message, "cannot name the finished run"));
+        assert_true(scratch_has(scratch_path(&s, "run.partial/run.sqlite")));
+        assert_int_equal(scratch_has(scratch_path(&s, "run/former")), back);
+        assert_int_equal(scratch_count(s.folder), 2); /* under either name */
+        assert_int_equal(logged - before, !back);
+    }
+    scratch_remove(&s);
+}
+
 /* A killed run: what was committed can be read; the next run says that it replaces it. */
 static void test_killed_run(void **state) {
     (void)state;
@@ -389,6 +435,7 @@ int main(void) {
         cmocka_unit_test(test_refusals),
         cmocka_unit_test(test_database_open_elsewhere),
         cmocka_unit_test(test_name_taken_meanwhile),
+        cmocka_unit_test(test_former_run_stays),
         cmocka_unit_test(test_killed_run),
         cmocka_unit_test(test_table_arguments),
         cmocka_unit_test(test_full_disk),

@@ -89,6 +89,11 @@ class Function:
                 f"switch (bst_mutant_choice({self.number})) {{\n{cases}default: break;\n}}\n{self.body}}}\n")
 
 
+def asks_for(text):
+    """The lines of a source that must be before its first header: which functions of the system it wants."""
+    return "".join(re.findall(r"^#define _\w+_SOURCE\b.*\n", text, re.M))
+
+
 def split_parameters(text):
     parts, depth, now = [], 0, ""
     for c in text:
@@ -152,7 +157,7 @@ class Library:
         place = os.path.join(self.scratch, path)
         os.makedirs(os.path.dirname(place), exist_ok=True)
         with open(place, "w", encoding="utf-8") as file:
-            file.write(CHOICE + text)
+            file.write(asks_for(text) + CHOICE + text)
         return place
 
     def compile_object(self, target, paths):

@@ -244,6 +244,8 @@ static void values_of_the_frames(void **state) {
         bst_assert_close(r->ra_deg, w->ra + 0.2, 1e-12);
         bst_assert_close(r->dec_deg, w->dec - 0.1, 1e-12);
         bst_assert_close(r->target_ra_deg, w->ra, 0);
+        bst_assert_close(r->target_dec_deg, w->dec, 0);
+        bst_assert_close(r->apparent_ra_deg, w->ra, 0);
         bst_assert_close(r->apparent_dec_deg, w->dec, 0);
         double ra = (w->ra + 0.2) * DEG, dec = (w->dec - 0.1) * DEG;
         const double look[3] = {cos(ra) * cos(dec), sin(ra) * cos(dec), sin(dec)};
