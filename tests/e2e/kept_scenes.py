@@ -399,3 +399,56 @@ def starry():
                               SENSOR + "/camera/distortion": {"k1": -40, "p1": 0.2}})
     scene["name"] = "stars"
     return scene
+
+
+def crowded():
+    """Many blends before the Milky Way: pairs closer than the filter separates, hits, telegraph pixels that move with no star, streaks
+    of unknown rate, windows about tracks; and a twin whose detections are drawn."""
+    scene = track(**{"epoch_utc": "2022-06-16T23:40:00Z"})
+    scene["world"].update(faint_stars="statistical", faint_limit_v_mag=9.5, objects=scene["world"]["objects"] + [
+        {"name": f"NEAR{k}", "area_m2": area, "albedo": 0.2,
+         "orbit": {"source": "relative", "reference": "INMARSAT GX5", "offset_rtn_m": offset, "rate_rtn_mps": rate}}
+        for k, (area, offset, rate) in enumerate([(3, [500, -900, 600], [0, 0, 0]), (6, [8000, -9000, 3000], [4, -60, 70]),
+                                                  (1.5, [-7000, 4000, -6000], [-2, 5, -3])])])
+    scene["world"]["objects"][0]["area_m2"] = 300
+    sensor = scene["observers"][0]["sensors"][0]
+    sensor["camera"].update(width_px=312, height_px=246, pixel_scale_arcsec=40, rotation_deg=64, aperture_m=0.15, full_well_e=26000,
+                            distortion={"k1": -12, "p1": 0.1, "p2": -0.05}, boresight_offset_px=[-12, 9],
+                            detector={"hot_fraction": 0.0006, "telegraph_noise_fraction": 0.0008, "telegraph_noise_rms_e": 90, "saturation": "bloom",
+                                      "cosmic_rays": {"rate_per_cm2_s": 60, "readout_s": 0.3}})
+    sensor["exposure"].update(exposure_s=0.15, period_s=1.1, window_px=[10, 4, 296, 238])
+    sensor["modules"]["control"]["exposure_s"] = 0.15
+    sensor["cue"].update(offset_deg=0.02, offset_axis="-y", offset_angle_deg=70, sigma_deg=0.04, v_mag=9)
+    sensor["knowledge"] = changed(KNOWLEDGE, {"/camera/distortion": {"k1": -11, "p1": 0.1}})
+    sensor["modules"]["imgproc"].update(false_splits=0.02, jitter_px=0.2, motion_bend_px=0.06, streak_search_px=26, track_windows=True,
+                                        full_frame_period=4, full_frame_count=2, window_px=60, mesh_px=40, column_correction="on")
+    sensor["modules"]["scenegen"]["star_limit_v_mag"] = 13
+    scene.update(name="crowded", duration_s=20, seed="0x61", record={"frames": "none"})
+    twin = copy.deepcopy(sensor)
+    twin.update(name="drawn", observation_source="generator")
+    twin["modules"]["tracker"] = {"type": "ukf", "motion": "orbit", "association": "pmb", "size_range_correlation_s": 60}
+    scene["observers"][0]["sensors"].append(twin)
+    return scene
+
+
+def streaked():
+    """Stars as streaks along a path that bends and changes its speed, a tabulated PSF, pixels of 2 x 2; and a twin whose detections are
+    drawn."""
+    scene = shipped("leo_leo_pass")
+    scene["world"].update(star_catalogue="embedded", faint_stars="statistical", faint_limit_v_mag=11)
+    sensor = scene["observers"][0]["sensors"][0]
+    sensor["camera"].update(width_px=470, height_px=382, rotation_deg=-41, boresight_offset_px=[13, -7], aperture_m=0.3, psf_fwhm_px=2.6,
+                            optics={"psf": "moffat", "moffat_beta": 3}, full_well_e=60000)
+    sensor["exposure"].update(exposure_s=0.06, period_s=0.5, binning=2, window_px=[8, 20, 450, 352])
+    sensor["cue"].update(offset_deg=0.05, offset_axis="y", sigma_deg=0.1)
+    sensor["modules"]["gimbal"]["platform"].update(jitter_low_px_rms=1.2, jitter_low_cutoff_hz=8, jitter_high_px_rms=0.4)
+    sensor["modules"]["imgproc"].update(motion_bend_px=0.1, jitter_px=0.4, false_splits=0.01, long_streaks=True)
+    sensor["modules"]["scenegen"]["star_limit_v_mag"] = 11
+    for body in (scene["world"]["objects"][0], scene["observers"][0]):
+        body["orbit"]["state"]["at_s"] = 38
+    scene.update(name="streaked", duration_s=2.4, seed="0x62", record={"frames": "none"})
+    twin = copy.deepcopy(sensor)
+    twin.update(name="drawn", observation_source="generator", x_axis_gcrf=[0.2, -0.9, 0.1])
+    twin["modules"]["obsgen"] = {"type": "statistical"}
+    scene["observers"][0]["sensors"].append(twin)
+    return scene

@@ -338,6 +338,14 @@ def scene_recorded(k):
            "--catalogue", "embedded", adds=[k.path("challenge")])
 
 
+def scene_crowded(k):
+    k.run("crowded", kept_scenes.crowded())
+
+
+def scene_streaked(k):
+    k.run("streaked", kept_scenes.streaked())
+
+
 def scene_studies(k):
     noise = kept_scenes.SENSOR + "/camera/read_noise_e"
     scene = kept_scenes.changed(kept_scenes.track(), {**kept_scenes.SMALL, kept_scenes.SENSOR + "/observation_source": "generator", "/duration_s": 14,
@@ -445,7 +453,7 @@ def scene_sensor(k):
 SCENES = {name[len("scene_"):]: function for name, function in sorted(globals().items()) if name.startswith("scene_")}
 # quick ones and those that are odd in the most ways first
 ORDER = ["unlike", "restored", "orbits", "unlike_derived", "charge", "tasking", "oem", "rolling", "wide", "visible", "infrared", "passing", "studies",
-         "measured", "sensor", "twin", "linked", "shown", "files", "lost", "search", "rate", "recorded"]
+         "crowded", "streaked", "measured", "sensor", "twin", "linked", "shown", "files", "lost", "search", "rate", "recorded"]
 
 
 def kept_path(name):

@@ -406,6 +406,77 @@ static void patterns(void **state) {
     assert_non_null(strstr(s->ctx.message, "114.592 deg"));
 }
 
+/* An exchange is open where errors of the tolerance in each number of the code may undo its rule:
+ * Re D - Re C and 1 - Re C - Re D then change by twice the tolerance. Both sides of each limit. */
+static void alternatives_within_the_tolerance(void **state) {
+    (void)state;
+    static const struct {
+        double c, d; /* real parts of C and D */
+        bool inner, outer;
+    } all[] = {{0.30, 0.339, true, false}, {0.30, 0.341, false, false},
+               {0.30, 0.661, false, true}, {0.30, 0.659, false, false},
+               {0.48, 0.51, true, true},   {0.10, 0.50, false, false}};
+    for (size_t k = 0; k < sizeof all / sizeof all[0]; k++) {
+        const bst_star_quad quad = {.code = {all[k].c, 0.2, all[k].d, -0.1}, .order = {3, 1, 0, 2}};
+        bst_star_quad out[3];
+        int count = bst_star_quad_alternatives(&quad, 0.02, out), inner = 0, outer = 0;
+        for (int i = 0; i < count; i++) {
+            bool ends = out[i].order[0] == 1, middle = out[i].order[2] == 2;
+            inner += middle && !ends;
+            outer += middle && ends;
+        }
+        assert_int_equal(inner, all[k].inner);
+        assert_int_equal(outer, all[k].outer);
+        assert_int_equal(count, all[k].inner + all[k].outer + (all[k].inner && all[k].outer));
+    }
+}
+
+/* A quad of the catalogue whose numbers are changed one at a time is found up to the tolerances
+ * and not beyond them: by a number of the code, and by its size, which may be smaller or larger
+ * than the pattern's by the scale's tolerance and that of the code. Words have 16 bits: 2e-4 of
+ * the size, 3e-5 of the code. */
+static void patterns_within_the_tolerances(void **state) {
+    scene *s = *state;
+    const double tolerance = 0.03, scale = 0.05, most = tolerance - log(1.0 - scale);
+    static bst_star_patterns_match all[4096];
+    int quads = 0;
+    for (uint64_t i = 0; quads < 8 && i < 40; i++) {
+        bst_star found[200];
+        int count;
+        bst_assert_ok(&s->ctx, bst_stars_query(&s->ctx, s->onboard, on_sphere(700 + i), 0.06,
+                                               V_LIMIT, YEAR, found, 200, &count));
+        bst_star_quad quad;
+        if (count < 4 ||
+            !bst_star_quad_make(
+                (bst_vec3[4]){found[0].icrs, found[1].icrs, found[2].icrs, found[3].icrs}, &quad) ||
+            bst_star_patterns_find(s->patterns, &quad, 1e-4, 1e-3, all, 1) != 1) {
+            continue;
+        }
+        const bst_vec3 own = all[0].icrs[0], other = all[0].icrs[2];
+        quads++;
+        for (int k = 0; k < 20; k++) {
+            int number = k / 4;
+            double share = k % 2 ? 0.99 : 1.01, sign = k % 4 < 2 ? 1.0 : -1.0;
+            bst_star_quad off = quad;
+            if (number < 4) {
+                off.code[number] += sign * share * tolerance;
+            } else {
+                off.size_rad *= exp(sign * share * most);
+            }
+            int n = bst_star_patterns_find(s->patterns, &off, tolerance, scale, all, 4096);
+            assert_true(n <= 4096);
+            bool here = false;
+            for (int m = 0; m < n; m++) {
+                here = here || (bst_vec3_angle(all[m].icrs[0], own) < 1e-9 &&
+                                bst_vec3_angle(all[m].icrs[2], other) < 1e-9 &&
+                                fabs(all[m].size_ratio * off.size_rad / quad.size_rad - 1) < 1e-6);
+            }
+            assert_int_equal(here, k % 2);
+        }
+    }
+    assert_int_equal(quads, 8);
+}
+
 /* Attitude and scale of exact places come back to rounding, from a start 0.3 deg and 3 % off. */
 static void the_fit_is_exact(void **state) {
     scene *s = *state;
@@ -449,6 +520,8 @@ int main(void) {
         cmocka_unit_test(codes),
         cmocka_unit_test(sky_cells),
         cmocka_unit_test(patterns),
+        cmocka_unit_test(alternatives_within_the_tolerance),
+        cmocka_unit_test(patterns_within_the_tolerances),
         cmocka_unit_test(the_fit_is_exact),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

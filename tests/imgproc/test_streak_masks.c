@@ -1,5 +1,6 @@
 /* What the search for streaks leaves out of its map: tracks of charge in all directions from one
- * end to the other and not more. Linked with a wrap that keeps the segments. */
+ * end to the other and not more, and discs about points. Linked with a wrap that keeps the
+ * segments. */
 #include <stdlib.h>
 
 #include "imgproc/streak/streak_map.h"
@@ -80,7 +81,55 @@ static void tracks_of_charge(void **state) {
     synthetic_free(&s);
 }
 
+/* Points are left out to where a matched-filtered Gaussian, SNR exp(-r^2 / (4 sigma^2)), has fallen
+ * to half a standard deviation, with a margin of up to a quarter and a pixel. */
+static void points_of_all_brightnesses(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    synthetic s;
+    synthetic_init(&s, SIDE, SIDE);
+    s.config.streak_search_px = 64.0;
+    bst_imgproc *ip = synthetic_processor(&ctx, &s);
+    bst_detections *d = synthetic_detections(2048);
+    const double noise = synthetic_noise(&s), sigma = 2.0 / BST_FWHM_PER_SIGMA;
+    double place[ACROSS * ACROSS][2], snr[ACROSS * ACROSS];
+    for (int k = 0; k < ACROSS * ACROSS; k++) {
+        place[k][0] = FIRST + SPACING * (k % ACROSS) + 0.07 * k;
+        place[k][1] = FIRST + SPACING * (double)(k / ACROSS) - 0.03 * k;
+        snr[k] = 12.0 * pow(1.3, k);
+        double norm = synthetic_norm(&s, place[k][0], place[k][1], 0.0, 0.0);
+        synthetic_add(&s, place[k][0], place[k][1], snr[k] * noise / norm, 0.0, 0.0);
+    }
+    synthetic_expose(&s, bst_rng_make_key(5, 0, "test", "masks"), 1);
+    bst_imgproc_frame frame = synthetic_frame(&s);
+    kept_count = 0;
+    bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, NULL, d, 2048));
+    for (int k = 0; k < ACROSS * ACROSS; k++) {
+        int seen = 0;
+        for (int n = 0; n < kept_count; n++) {
+            const double *m = kept[n];
+            if (hypot(m[0] - place[k][0], m[1] - place[k][1]) > 2.0) {
+                continue;
+            }
+            seen++;
+            bst_assert_close(m[2], m[0], 0.0);
+            bst_assert_close(m[3], m[1], 0.0);
+            bst_assert_close(m[0], place[k][0], 0.5);
+            bst_assert_close(m[1], place[k][1], 0.5);
+            /* SNR differ by noise and by the pixel's share in the width: an eighth */
+            double least = 2.0 * sigma * sqrt(log(2.0 * 0.85 * snr[k]));
+            double most = 2.0 * sigma * sqrt(log(2.0 * 1.15 * snr[k]));
+            assert_true(m[4] > least && m[4] < 1.25 * most + 1.0);
+        }
+        assert_true(seen > 0);
+    }
+    free(d);
+    bst_imgproc_free(ip);
+    synthetic_free(&s);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(tracks_of_charge)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(tracks_of_charge),
+                                       cmocka_unit_test(points_of_all_brightnesses)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -77,7 +77,87 @@ static void orbits_come_back(void **state) {
     }
 }
 
+/* Directions of a body that is integrated here, seen by a moving observer that stands still in the
+ * barycentre's axes, light time included.
+ *
+ * Returned:  the time of emission, s from the middle */
+static double observe(const motion *body, const motion *eye, double t, bst_od_observation *out) {
+    const motion now = moved(*eye, t);
+    double late = 0.0;
+    *out = (bst_od_observation){.cov_11 = 1e-12, .cov_22 = 1e-12};
+    for (int n = 0; n < 4; n++) {
+        bst_vec3 line = bst_vec3_sub(moved(*body, t - late).r, now.r);
+        late = bst_vec3_norm(line) / LIGHT_MPS;
+        out->direction = bst_vec3_unit(line);
+    }
+    out->observer.time_s = 5000.0 + t;
+    out->observer.position_m = now.r;
+    out->observer.velocity_mps = now.v;
+    return t - late;
+}
+
+/* Candidates of the admissible region have the direction and the rate of one of the observations
+ * for any range, so that a wrong axis shows in all of them; the rate is that of the polynomial
+ * through the arc, right to its fourth order. RMS residuals are as directions integrated here give
+ * them, per axis, over ten of the observations. */
+static void candidates_have_direction_and_rate(void **state) {
+    (void)state;
+    enum { COUNT = 10 };
+    const motion body = {{-1.9e7, 1.7e7, 9e6}, {-2.2e3, -2.4e3, 1.9e3}};
+    const motion eye = {{1e6, 6.6e6, -2.2e6}, {-7.1e3, 1.0e3, 0.9e3}};
+    bst_od_observation o[COUNT];
+    bst_ctx ctx = {0};
+    bst_od_candidate all[BST_OD_CANDIDATES];
+    int found, admissible = 0;
+    for (int i = 0; i < COUNT; i++) {
+        observe(&body, &eye, -60.0 + 13.0 * i + (i % 3), &o[i]);
+    }
+    bst_assert_ok(&ctx, bst_od_initial(&ctx, o, COUNT, all, &found));
+    for (int n = 0; n < found; n++) {
+        const motion m = {all[n].state.position_m, all[n].state.velocity_mps};
+        double sum = 0.0;
+        for (int i = 0; i < COUNT; i++) {
+            bst_od_observation seen;
+            const motion there = moved(m, 5000.0 - all[n].state.time_s); /* at the middle */
+            observe(&there, &eye, o[i].observer.time_s - 5000.0, &seen);
+            sum += pow(bst_vec3_angle(seen.direction, o[i].direction), 2);
+        }
+        /* rounding of directions, and steps of the integration */
+        bst_assert_close(all[n].rms_rad, sqrt(sum / (2.0 * COUNT)), 1e-3 * all[n].rms_rad + 1e-9);
+        assert_true(n == 0 || all[n].rms_rad >= all[n - 1].rms_rad);
+        if (all[n].method != BST_OD_ADMISSIBLE) {
+            continue;
+        }
+        admissible++;
+        int of = -1;
+        for (int i = 0; i < COUNT; i++) {
+            double range = bst_vec3_norm(bst_vec3_sub(m.r, o[i].observer.position_m));
+            if (fabs(all[n].state.time_s + range / LIGHT_MPS - o[i].observer.time_s) < 1e-6) {
+                of = i;
+            }
+        }
+        assert_true(of >= 0);
+        bst_vec3 line = bst_vec3_sub(m.r, o[of].observer.position_m);
+        bst_vec3 v = bst_vec3_sub(m.v, o[of].observer.velocity_mps);
+        bst_vec3 q = bst_vec3_unit(line);
+        bst_assert_close(bst_vec3_angle(q, o[of].direction), 0.0, 1e-6);
+        bst_vec3 rate =
+            bst_vec3_scale(bst_vec3_axpy(v, -bst_vec3_dot(v, q), q), 1.0 / bst_vec3_norm(line));
+        bst_od_observation side[2];
+        double t = o[of].observer.time_s - 5000.0;
+        observe(&body, &eye, t + 1.0, &side[0]);
+        observe(&body, &eye, t - 1.0, &side[1]);
+        bst_vec3 truth = bst_vec3_scale(bst_vec3_sub(side[0].direction, side[1].direction), 0.5);
+        /* the rate of directions, which is that of the body at emission to v / c */
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(rate, truth)) / bst_vec3_norm(truth), 0.0,
+                         1e-3);
+    }
+    print_message("%d candidates, %d of the admissible region\n", found, admissible);
+    assert_true(admissible >= 3);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(orbits_come_back)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(orbits_come_back),
+                                       cmocka_unit_test(candidates_have_direction_and_rate)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
