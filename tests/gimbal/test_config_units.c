@@ -94,7 +94,7 @@ static void stages_have_the_inertia_that_is_stated(void **state) {
 
 /* Second moments of mass along three turned axes, p, q and r: the inertia is (p + q + r) minus
  * their tensor. A body has it if all three are positive, and none if one is negative. */
-static void tensors_of_bodies_are_told_from_others(void **state) {
+static void tensors_of_bodies_are_distinguished(void **state) {
     (void)state;
     const double least[] = {0.004, -0.004};
     for (int i = 0; i < 60; i++) {
@@ -269,7 +269,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_chain_of_three_axes),
         cmocka_unit_test(stages_have_the_inertia_that_is_stated),
-        cmocka_unit_test(tensors_of_bodies_are_told_from_others),
+        cmocka_unit_test(tensors_of_bodies_are_distinguished),
         cmocka_unit_test(a_second_order_mount),
         cmocka_unit_test(an_attitude_controller),
         cmocka_unit_test(a_star_tracker),

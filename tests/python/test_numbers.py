@@ -135,18 +135,18 @@ class Messages(unittest.TestCase):
         rows = np.zeros(3, messages.PointingTelemetry.item_dtype)
         rows["tick"] = ticks
         rows["q_cam_from_gcrf"] = [turned(0.1), -turned(0.104), turned(0.11)]
-        told = messages.PointingTelemetry(rows)
+        telemetry = messages.PointingTelemetry(rows)
         # linear in the angle but for its cube; the same up to the sign
         for tick, angle in ((0, 0.1), (100, 0.1), (115, 0.101), (160, 0.104), (235, 0.1085), (260, 0.11), (999, 0.11)):
-            q = commands.attitude_at(told, tick)
+            q = commands.attitude_at(telemetry, tick)
             self.assertAlmostEqual(abs(q @ turned(angle)), 1, delta=1e-13)
             self.assertLess(np.abs(np.abs(q) - np.abs(turned(angle))).max(), 1e-9)
         np.testing.assert_array_equal(commands.attitude_at(messages.PointingTelemetry(), 5), np.zeros(4))
         found = commands.complete_detections(
             messages.Detections({"x_px": [1, 2, 3], "cov_xx": [0, 0.5, 0], "cov_yy": [0, 0.25, 0.125]}),
-            messages.FrameMessage(exposure_id=4, start_tick=100, end_tick=130), told)
+            messages.FrameMessage(exposure_id=4, start_tick=100, end_tick=130), telemetry)
         self.assertEqual((found.exposure_id, found.start_tick, found.end_tick), (4, 100, 130))
-        np.testing.assert_allclose(found.q_cam_from_gcrf, commands.attitude_at(told, 115))
+        np.testing.assert_allclose(found.q_cam_from_gcrf, commands.attitude_at(telemetry, 115))
         np.testing.assert_array_equal(found.q_telemetry_from_gcrf, found.q_cam_from_gcrf)
         self.assertEqual((list(found.items["cov_xx"]), list(found.items["cov_yy"])), ([0.01, 0.5, 0], [0.01, 0.25, 0.125]))
 
