@@ -109,7 +109,7 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
                                                     g->config.loss_tolerance_px * g->env.pixel_rad};
         BST_TRY(bst_pointing_feasibility_chase(ctx, &problem, &span, &loss, 1, &losses));
         bool rolls = false;
-        double before = g->roll_rad;
+        const double before = g->roll_given ? g->roll_rad : g->mount.roll.angle_rad;
         if (losses > 0 && g->config.body_roll) {
             BST_TRY(bst_guidance_choose_roll(ctx, g, &problem, horizon, &rolls));
         }

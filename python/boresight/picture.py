@@ -16,8 +16,9 @@ def stretched(data: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
     """Grey levels of a frame: from the 5 % quantile to the 99.8 % quantile, reduced in size by the
     brightest pixel of each block."""
     step = -(-max(data.shape) // WIDEST)
-    height, width = (size // step for size in data.shape)
-    blocks = data[:height * step, :width * step].reshape(height, step, width, step)
+    rows, columns = (min(step, size) for size in data.shape)  # of a block: a frame may be thinner
+    height, width = data.shape[0] // rows, data.shape[1] // columns
+    blocks = data[:height * rows, :width * columns].reshape(height, rows, width, columns)
     small = blocks.max(axis=(1, 3)).astype(float)
     low, high = np.quantile(small, (0.05, 0.998))
     level = np.clip((small - low) / max(high - low, 1.0), 0.0, 1.0)

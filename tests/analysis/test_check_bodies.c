@@ -133,6 +133,47 @@ static void the_earth(void **state) {
     spans_beside(BST_FIELD_EARTH, 40.0, 1.2, 4);
 }
 
+/* A body that enters in the last step of the search, 10 s, stays until the end of the run; one that
+ * leaves in it leaves where it does. */
+static void the_last_step(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scene s;
+    double radius, ra, dec;
+    open_scene(&s, 0, 0);
+    bst_vec3 d = body_at(&s, BST_FIELD_EARTH, 9000.0, &radius);
+    close_scene(&s);
+    bst_vec3 look =
+        bst_vec3_unit(bst_vec3_axpy(d, tan(40.0 * BST_DEG_RAD), bst_vec3_perpendicular(d)));
+    bst_vec3_to_radec(look, &ra, &dec);
+    open_scene(&s, ra / BST_DEG_RAD, dec / BST_DEG_RAD);
+    bst_check_body_span items[MOST], last[MOST];
+    bst_check_body_spans found = {.items = items, .capacity = MOST};
+    bst_assert_ok(&ctx, bst_check_bodies_in_field(&ctx, &s.scenario, s.world, 0, 0, &found));
+    int which = 0;
+    while (which < found.count &&
+           !(items[which].body == BST_FIELD_EARTH && items[which].from_s > 12000.0)) {
+        which++;
+    }
+    assert_true(which < found.count);
+    const double ends[2] = {items[which].from_s + 3.0, items[which].until_s + 3.0};
+    for (int leaves = 0; leaves < 2; leaves++) {
+        s.scenario.duration_s = ends[leaves];
+        bst_check_body_spans again = {.items = last, .capacity = MOST};
+        bst_assert_ok(&ctx, bst_check_bodies_in_field(&ctx, &s.scenario, s.world, 0, 0, &again));
+        int at = again.count - 1;
+        while (at >= 0 && last[at].body != BST_FIELD_EARTH) {
+            at--;
+        }
+        assert_true(at >= 0);
+        /* both bisected to 0.1 s */
+        bst_assert_close(last[at].from_s, items[which].from_s, 0.2);
+        bst_assert_close(last[at].until_s, leaves ? items[which].until_s : ends[0], 0.2);
+        assert_true(leaves || last[at].until_s == s.scenario.duration_s);
+    }
+    close_scene(&s);
+}
+
 /* Sky at the boresight that fills the well. The day side has V 2.4 per square arcsecond (an albedo
  * of 0.3: -26.74 - 2.5 log10(0.3 / pi) + 26.57), which the limb glow falls from by e every 8 km.
  * Pixels of 3 arcsec behind 0.15 m of 0.7 x 0.7 fill 100,000 e- in 0.5 s up to 59 km of height
@@ -183,6 +224,7 @@ int main(void) {
         cmocka_unit_test(the_moon),
         cmocka_unit_test(the_sun),
         cmocka_unit_test(the_earth),
+        cmocka_unit_test(the_last_step),
         cmocka_unit_test(a_sky_that_fills_the_well),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -120,6 +120,32 @@ static void all_forms_give_the_same_set(void **state) {
     free(reference);
 }
 
+/* Each angle in its own member, retrograde orbits too. */
+static void angles_are_those_that_are_written(void **state) {
+    (void)state;
+    static const double inclination[] = {0.0, 51.6416, 90.0, 90.0001, 98.7, 179.99, 180.0};
+    for (size_t i = 0; i < sizeof inclination / sizeof *inclination; i++) {
+        char text[500];
+        bst_ctx ctx = {0};
+        bst_elements *set;
+        int count;
+        snprintf(text, sizeof text,
+                 "{" ID "," EPOCH
+                 ",\"MEAN_MOTION\":14.5,\"ECCENTRICITY\":0.0011,"
+                 "\"INCLINATION\":%.4f,\"RA_OF_ASC_NODE\":201.5,\"ARG_OF_PERICENTER\":73.25,"
+                 "\"MEAN_ANOMALY\":-11.75,\"BSTAR\":1e-4}",
+                 inclination[i]);
+        bst_assert_ok(&ctx, read_text(&ctx, text, NULL, &set, &count));
+        assert_int_equal(count, 1);
+        bst_assert_close(set->inclination_rad / BST_DEG_RAD, inclination[i], 1e-13); /* rounding */
+        bst_assert_close(set->raan_rad / BST_DEG_RAD, 201.5, 1e-13);
+        bst_assert_close(set->arg_perigee_rad / BST_DEG_RAD, 73.25, 1e-13);
+        bst_assert_close(set->mean_anomaly_rad / BST_DEG_RAD, -11.75, 1e-13);
+        bst_assert_close(set->mean_motion_radpmin * 1440.0 / (2.0 * BST_PI), 14.5, 1e-13);
+        free(set);
+    }
+}
+
 static void numbers_have_nine_digits(void **state) {
     (void)state;
     const char *numbers[] = {"0", "1", "99999", "100000", "340000", "799501234", "999999999"};
@@ -382,10 +408,15 @@ static void a_long_line_is_refused(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_forms_give_the_same_set), cmocka_unit_test(numbers_have_nine_digits),
-        cmocka_unit_test(one_satellite_is_picked),     cmocka_unit_test(epochs_are_exact),
-        cmocka_unit_test(errors_say_where_and_what),   cmocka_unit_test(bad_sets_can_be_skipped),
-        cmocka_unit_test(survives_damaged_files),      cmocka_unit_test(loads_from_disk),
+        cmocka_unit_test(all_forms_give_the_same_set),
+        cmocka_unit_test(angles_are_those_that_are_written),
+        cmocka_unit_test(numbers_have_nine_digits),
+        cmocka_unit_test(one_satellite_is_picked),
+        cmocka_unit_test(epochs_are_exact),
+        cmocka_unit_test(errors_say_where_and_what),
+        cmocka_unit_test(bad_sets_can_be_skipped),
+        cmocka_unit_test(survives_damaged_files),
+        cmocka_unit_test(loads_from_disk),
         cmocka_unit_test(a_long_line_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

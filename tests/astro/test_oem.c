@@ -499,6 +499,10 @@ static void errors_say_where_and_what(void **state) {
         {GOOD "COVARIANCE_START\nEPOCH = 2022-06-16T00:00:00\n1\nEPOCH = 2022-06-16T00:00:00\n",
          "x.oem:19: the covariance before it is not complete (found \"EPOCH = "
          "2022-06-16T00:00:00\", expected 6 rows of numbers)"},
+        {GOOD "COVARIANCE_START\nEPOCH = 2022-06-16T00:00:00\n1\n0 1\n0 0 1\n0 0 0 1\n0 0 0 0 1\n"
+              "COVARIANCE_STOP\n",
+         "x.oem:23: the covariance is not complete (found \"COVARIANCE_STOP\", expected EPOCH and "
+         "6 rows of numbers)"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         bst_ctx ctx = {0};

@@ -211,8 +211,64 @@ static void a_turn_of_the_outer_axis_is_a_loss(void **state) {
     bst_assert_close(g.roll_rad / DEG, 20.0, 1e-9); /* rounding */
 }
 
+/* The pass of look(), which begins at 5 s, for a body that turns as guidance predicts. */
+static bst_status aim(void *user, bst_ctx *ctx, int64_t tick, bool *valid, bst_vec3 *direction) {
+    const pass *p = user;
+    (void)ctx;
+    double m = p->miss_deg * DEG, a = 2.0 * DEG * ((double)tick / 1000.0 - 45.0);
+    *direction = (bst_vec3){cos(a) * sin(m), cos(a) * cos(m), -sin(a)};
+    *valid = true;
+    return BST_OK;
+}
+
+/* The event of a roll gives its length from the roll that was asked for before, or else from where
+ * the body is, positive about its axis. */
+static void the_event_has_the_length_of_the_roll(void **state) {
+    (void)state;
+    static bst_guidance g;
+    const struct {
+        double miss_deg, from_deg, given_deg, chosen_deg, length_deg;
+    } cases[] = {
+        {12.0, 0.0, NAN, 20.0, 20.0},     {-12.0, 0.0, NAN, -20.0, -20.0},
+        {12.0, -5.0, NAN, 20.0, 25.0},    {-12.0, -5.0, NAN, -20.0, -15.0},
+        {12.0, 5.0, -10.0, 20.0, 30.0},
+    };
+    for (int i = 0; i < 5; i++) {
+        bst_ctx ctx = {0};
+        pass p = {.miss_deg = cases[i].miss_deg};
+        make_mount(&g, 5.0);
+        g.config.limit_fraction = 1.0;
+        g.config.prediction_horizon_s = 80.0;
+        g.config.body_roll = true;
+        g.env.tick_rate_hz = 1000.0;
+        g.env.aim = aim;
+        g.env.user = &p;
+        g.nav.position_gcrf_m = (bst_vec3){7e6, 0, 0};
+        g.nav.velocity_gcrf_mps = (bst_vec3){0, 7500, 0};
+        g.told_from_s = g.told_until_s = INFINITY;
+        g.mount.tick = 5000;
+        g.mount.roll.angle_rad = cases[i].from_deg * DEG;
+        g.mount.roll.rate_limit_radps = 2.0 * DEG;
+        g.mount.roll.accel_limit_radps2 = 1.0 * DEG;
+        g.mount.q_body_from_gcrf = bst_quat_from_rotvec((bst_vec3){0, 0, -cases[i].from_deg * DEG});
+        g.roll_given = !isnan(cases[i].given_deg);
+        g.roll_rad = g.roll_given ? cases[i].given_deg * DEG : 0.0;
+        bst_assert_ok(&ctx, bst_guidance_look_ahead(&ctx, &g, 5000));
+        assert_int_equal(g.event_count, 1);
+        assert_int_equal(g.events[0].kind, BST_GUIDANCE_ROLL);
+        bst_assert_close(g.roll_rad / DEG, cases[i].chosen_deg, 1e-9); /* rounding */
+        bst_assert_close(g.events[0].length_rad / DEG, cases[i].length_deg, 1e-9);
+        char text[200];
+        bst_guidance_describe(&g.events[0], text, sizeof text);
+        char begins[40];
+        snprintf(begins, sizeof begins, "the body rolls by %.1f deg", cases[i].length_deg);
+        assert_memory_equal(text, begins, strlen(begins));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_event_has_the_length_of_the_roll),
         cmocka_unit_test(the_roll_is_where_its_limits_have_it),
         cmocka_unit_test(the_least_roll_that_is_enough_is_taken),
         cmocka_unit_test(without_a_way_the_roll_stays),

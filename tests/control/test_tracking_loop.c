@@ -378,8 +378,59 @@ static void gains_at_any_period(void **state) {
     }
 }
 
+/* A response of straight pieces is the same in samples four times as close: of means over any
+ * stretch of time, from and to between samples. */
+static void samples_as_close_as_wanted_give_the_same(void **state) {
+    (void)state;
+    enum { COARSE = 76, FINE = 4 * (COARSE - 1) + 1 };
+    bst_ctx ctx = {0};
+    double step[2][FINE], lag[2][FINE];
+    for (int n = 0; n < COARSE; n++) {
+        double t = 0.02 * n, left = n < COARSE - 2 ? exp(-5.0 * t) : 0.0;
+        step[0][n] = 1.0 - left * cos(20.0 * t);
+        lag[0][n] = left * sin(11.0 * t) / 11.0;
+    }
+    for (int n = 0; n < FINE; n++) {
+        int k = n / 4 < COARSE - 1 ? n / 4 : COARSE - 2;
+        double part = n / 4.0 - k;
+        step[1][n] = step[0][k] + part * (step[0][k + 1] - step[0][k]);
+        lag[1][n] = lag[0][k] + part * (lag[0][k + 1] - lag[0][k]);
+    }
+    const bst_tracking_timing odd = {0.1, 0.0613, 0.1337, 0.1871, 0.1529};
+    const bst_tracking_observer observer = {0.5, 0.2, 1.03, 0.0017};
+    const bst_compensator c = {
+        .dt_s = 0.1, .stages = 1, .stage = {{.b0 = 0.4, .b1 = -0.3, .a1 = -1.0}}};
+    for (int observes = 0; observes < 2; observes++) {
+        bst_tracking_loop *loop[2];
+        for (int fine = 0; fine < 2; fine++) {
+            const bst_control_servo_response servo = {.dt_s = fine ? 0.005 : 0.02,
+                                                      .count = fine ? FINE : COARSE,
+                                                      .step = step[fine],
+                                                      .ramp_lag = lag[fine]};
+            bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &odd, &servo, observes ? NULL : &c,
+                                                         observes ? &observer : NULL, &loop[fine]));
+        }
+        for (int i = 0; i < 12; i++) {
+            double w = 0.3 * pow(1.45, i), offset = -0.031 + 0.0061 * i;
+            double complex of[2][3];
+            for (int fine = 0; fine < 2; fine++) {
+                of[fine][0] = bst_tracking_open(loop[fine], w);
+                of[fine][1] = bst_tracking_rejection(loop[fine], w, offset);
+                of[fine][2] = bst_tracking_noise(loop[fine], w, offset);
+            }
+            for (int k = 0; k < 3; k++) { /* rounding of sums over 300 samples */
+                bst_assert_close(cabs(of[1][k] - of[0][k]), 0.0, 1e-11 * (1.0 + cabs(of[0][k])));
+                assert_true(cabs(of[0][k]) > 1e-4);
+            }
+        }
+        bst_tracking_loop_free(loop[0]);
+        bst_tracking_loop_free(loop[1]);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(samples_as_close_as_wanted_give_the_same),
         cmocka_unit_test(an_ideal_mount_leaves_what_the_filter_misses),
         cmocka_unit_test(gains_at_any_period),
         cmocka_unit_test(test_rejection),

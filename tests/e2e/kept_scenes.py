@@ -452,3 +452,38 @@ def streaked():
     twin["modules"]["obsgen"] = {"type": "statistical"}
     scene["observers"][0]["sensors"].append(twin)
     return scene
+
+
+def checks():
+    """{name: scene} that the rules of `check` speak of, with numbers that differ from sensor to sensor."""
+    unlike_ = unlike()
+    unlike_.pop("record")
+    unlike_["duration_s"] = 12000
+    first, second = unlike_["observers"][0]["sensors"]
+    third = unlike_["observers"][1]["sensors"][0]
+    for k, sensor in enumerate((first, second, third)):
+        sensor["observation_source"] = "generator"
+        sensor["modules"]["control"]["guidance"] = {"sun_keep_out_deg": 61 - 13 * k, "moon_keep_out_deg": 20 + 9 * k, "earth_keep_out": True,
+                                                    "earth_limb_keep_out_deg": 9 - 2 * k, "earth_limb_altitude_km": 140}
+        sensor["camera"]["background"] = {"model": "sky", "stray_e_per_s": 5}
+    first["camera"].update(ensquared_energy=0.43, full_well_e=20000)
+    first["exposure"].update(exposure_s=1.7)
+    first["modules"]["tracker"].update(initiation_gap_s=0.6, max_coast_s=0.9)
+    second["camera"].update(zero_point_mag=19.5)
+    second["exposure"].update(dropped_fraction=1.0)
+    second["modules"]["control"].update(dwell_timeout_s=1.5, acquire_timeout_s=0.8)
+    third["camera"].update(pixel_scale_arcsec=600, width_px=350, height_px=440)
+    third["exposure"].update(first_s=11999.9)
+    unlike_["world"]["objects"][0]["burns"] = [{"time_s": 900, "dv_rtn_mps": [300, -700, 900]}, {"time_s": 12500, "dv_rtn_mps": [1, 2, 3]}]
+    unlike_["observers"][0]["burns"] = [{"time_s": 30000, "dv_rtn_mps": [3, 1, 2]}]
+    gimbal, control = SENSOR + "/modules/gimbal", SENSOR + "/modules/control"
+    slow = changed(search(), {gimbal + "/rate_limit_degps": 0.011, gimbal + "/accel_limit_degps2": 0.0004})
+    scan = changed(slow, {control + "/strategy": "scan", control + "/scan_rate_arcsec_per_s": 37, gimbal + "/accel_limit_degps2": 3e-5})
+    ideal = changed(track(), {gimbal: {"type": "ideal", "target": "direction", "ra_deg": 306, "dec_deg": -24.3}, "/duration_s": 9000,
+                              SENSOR + "/camera/background": {"model": "sky"}})
+    return {"unlike": unlike_, "slow": slow, "scan": scan, "ideal": ideal,
+            "old": changed(tasking(), {"/epoch_utc": "2022-07-09T03:00:00Z", "/duration_s": 4000}),
+            "fast": changed(scan, {control + "/scan_rate_arcsec_per_s": 70}),
+            "passing": changed(passing(), {"/duration_s": 7000, gimbal + "/rate_limit_degps": 0.6, gimbal + "/accel_limit_degps2": 0.2}),
+            "sun": changed(ideal, {gimbal + "/ra_deg": 85.1, gimbal + "/dec_deg": 23.36, "/duration_s": 3000}),
+            "late": changed(rate(), {"/duration_s": 25000})}

@@ -210,6 +210,15 @@ def scene_unlike_derived(k):
            "--streak", "6", "--known-rate", "--threads", "1", "--json", k.path("pd.json"), text=False, adds=[k.path("pd.json")])
 
 
+def scene_checks(k):
+    for name, scene in kept_scenes.checks().items():
+        warned = runs.call("check", k.write(name + ".json", scene), "--quiet")
+        k.columns.put(f"{name} exit", float(warned.returncode))
+        for i, line in enumerate(warned.stderr.splitlines()):  # each has numbers of its own size
+            k.columns.put_text(f"{name} {i}", line)
+    k.call("figures", "check", k.write("infrared.json", kept_scenes.infrared()), "--figures", "-")
+
+
 def scene_charge(k):
     scene = kept_scenes.charge()
     out = k.run("charge", scene)
@@ -452,8 +461,8 @@ def scene_sensor(k):
 
 SCENES = {name[len("scene_"):]: function for name, function in sorted(globals().items()) if name.startswith("scene_")}
 # quick ones and those that are odd in the most ways first
-ORDER = ["unlike", "restored", "orbits", "unlike_derived", "charge", "tasking", "oem", "rolling", "wide", "visible", "infrared", "passing", "studies",
-         "crowded", "streaked", "measured", "sensor", "twin", "linked", "shown", "files", "lost", "search", "rate", "recorded"]
+ORDER = ["unlike", "restored", "orbits", "checks", "unlike_derived", "charge", "tasking", "oem", "rolling", "wide", "visible", "infrared", "passing",
+         "studies", "crowded", "streaked", "measured", "sensor", "twin", "linked", "shown", "files", "lost", "search", "rate", "recorded"]
 
 
 def kept_path(name):

@@ -92,6 +92,41 @@ static void stages_have_the_inertia_that_is_stated(void **state) {
     }
 }
 
+/* Second moments of mass along three turned axes, p, q and r: the inertia is (p + q + r) minus
+ * their tensor. A body has it if all three are positive, and none if one is negative. */
+static void tensors_of_bodies_are_distinguished(void **state) {
+    (void)state;
+    const double least[] = {0.004, -0.004};
+    for (int i = 0; i < 60; i++) {
+        const bst_quat turn =
+            bst_quat_unit((bst_quat){sin(3.1 * i), cos(1.7 * i), sin(0.9 * i + 1), cos(2.3 * i)});
+        for (int negative = 0; negative < 2; negative++) {
+            double moment[3] = {0.15, 0.21, 0.27}, tensor[3][3] = {{0.0}};
+            moment[i % 3] = least[negative];
+            for (int k = 0; k < 3; k++) {
+                const bst_vec3 e = bst_quat_rotate(turn, (bst_vec3){k == 0, k == 1, k == 2});
+                const double axis[3] = {e.x, e.y, e.z};
+                for (int a = 0; a < 9; a++) {
+                    tensor[a / 3][a % 3] += moment[k] * axis[a / 3] * axis[a % 3];
+                }
+            }
+            const double sum = moment[0] + moment[1] + moment[2];
+            const double j[6] = {sum - tensor[0][0], sum - tensor[1][1], sum - tensor[2][2],
+                                 -tensor[0][1],      -tensor[0][2],      -tensor[1][2]};
+            bst_ctx ctx = {0};
+            bst_mount_config c;
+            bst_mount m;
+            bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_mount_config_table, &c));
+            memcpy(c.inertia_outer_kgm2, j, sizeof j);
+            const bst_status status = bst_mount_init(
+                &ctx, &m, i % 2 ? BST_MOUNT_AZIMUTH_ELEVATION : BST_MOUNT_CROSS_ELEVATION, &c, 1e-3,
+                (bst_rng_key){{1, 2}});
+            assert_int_equal(status, negative ? BST_ERR_CONFIG : BST_OK);
+            assert_true(!negative || strstr(ctx.message, "inertia_outer_kgm2: no body"));
+        }
+    }
+}
+
 static void a_second_order_mount(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -234,6 +269,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_chain_of_three_axes),
         cmocka_unit_test(stages_have_the_inertia_that_is_stated),
+        cmocka_unit_test(tensors_of_bodies_are_distinguished),
         cmocka_unit_test(a_second_order_mount),
         cmocka_unit_test(an_attitude_controller),
         cmocka_unit_test(a_star_tracker),

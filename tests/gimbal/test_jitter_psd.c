@@ -85,12 +85,13 @@ static void variance_is_the_integral_at_every_step(void **state) {
     (void)state;
     static bst_jitter_noise noise;
     bst_jitter_noise_init(&noise, &bent, 400.0, DT, bst_rng_make_key(4, 0, "a", "psd"));
-    double square[8] = {0.0}, fourth = 0.0, cross = 0.0;
+    double square[8] = {0.0}, product[8] = {0.0}, fourth = 0.0, cross = 0.0;
     const int blocks = 400;
     for (int n = 0; n < blocks * 1024; n++) {
         double v[2];
         bst_jitter_noise_at(&noise, n, v);
         square[(n + 2) % 1024 / 128] += v[0] * v[0] + v[1] * v[1];
+        product[(n + 2) % 1024 / 128] += v[0] * v[1];
         fourth += pow(v[0], 4) + pow(v[1], 4);
         cross += v[0] * v[1];
     }
@@ -102,11 +103,37 @@ static void variance_is_the_integral_at_every_step(void **state) {
         /* bands some 30 Hz wide give 8 free values in 128 ms: 2 axes, 400 blocks: 1.8 %, four times
          */
         bst_assert_close(mean / variance, 1.0, 0.07);
+        /* nowhere in a block does one axis follow the other: 1 / sqrt(3200), four times */
+        bst_assert_close(product[i] / (count / 8.0) / variance, 0.0, 0.07);
     }
     bst_assert_close(total / variance, 1.0, 0.025);
     /* Gaussian: the fourth moment is 3 squares; the axes are independent */
     bst_assert_close(fourth / (2.0 * count) / (variance * variance), 3.0, 0.25);
     bst_assert_close(cross / count / variance, 0.0, 0.025);
+}
+
+/* A density whose power is slower than half a bin: the mean of a block has all of it. */
+static void what_is_slower_than_a_block_has_its_variance(void **state) {
+    (void)state;
+    static bst_jitter_noise noise;
+    static const bst_jitter_density_point points[] = {
+        {0.0, 1.0}, {0.05, 1.0}, {0.06, 1e-4}, {10.0, 1e-6}};
+    const bst_jitter_density still = {points, 4};
+    const int keys = 300;
+    double square[2] = {0.0};
+    for (int k = 0; k < keys; k++) {
+        double v[2];
+        bst_jitter_noise_init(&noise, &still, 400.0, DT,
+                              bst_rng_make_key(9, (uint64_t)k, "a", "psd"));
+        bst_jitter_noise_at(&noise, 700 * k, v);
+        square[0] += v[0] * v[0] / keys;
+        square[1] += v[1] * v[1] / keys;
+    }
+    assert_int_equal(noise.stride, 4); /* bins of 0.12 Hz */
+    double variance = bst_jitter_density_integral(&still, 0.0, 1e9);
+    for (int axis = 0; axis < 2; axis++) {
+        bst_assert_close(square[axis] / variance, 1.0, 4.0 * sqrt(2.0 / keys)); /* 4 sigma */
+    }
 }
 
 static void slow_noise_is_smooth_between_its_nodes(void **state) {
@@ -298,6 +325,7 @@ int main(void) {
         cmocka_unit_test(integrals_are_closed_forms),
         cmocka_unit_test(spectrum_is_the_table),
         cmocka_unit_test(variance_is_the_integral_at_every_step),
+        cmocka_unit_test(what_is_slower_than_a_block_has_its_variance),
         cmocka_unit_test(slow_noise_is_smooth_between_its_nodes),
         cmocka_unit_test(value_depends_on_the_step_alone),
         cmocka_unit_test(lines_are_sines),

@@ -31,8 +31,8 @@ static bst_scene_surroundings look_down(bst_vec3 eye, double y_rad) {
     "\"width_px\": " size ", \"height_px\": " size                                     \
     ", \"background_mag_arcsec2\": 21, \"background\": {" background "}}}]}]}"
 
-static const bst_skylight_map *make(bst_world *world, const bst_scene_surroundings *around,
-                                    bst_window window, bst_skylight **skylight) {
+static inline const bst_skylight_map *make(bst_world *world, const bst_scene_surroundings *around,
+                                           bst_window window, bst_skylight **skylight) {
     bst_ctx ctx = {0};
     const bst_skylight_map *map;
     bst_assert_ok(&ctx, bst_skylight_create(&ctx, world, bst_world_camera(world, 0, 0), skylight));

@@ -84,6 +84,37 @@ static void two_points(void **state) {
     bst_shape_light_free(&work);
 }
 
+/* Two cells beside each other along x or y, with their light near their common edge or far from it:
+ * the places within the cells decide how much of the two images is one. */
+static void light_is_where_it_is_in_its_cell(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_shape_light work = {0};
+    const double sigma = 0.6;
+    for (int k = 0; k < 4; k++) {
+        const int along_y = k / 2, apart = k % 2;
+        bst_resolved_image m = make_image(1.0, 3, -2, 8, 6);
+        const float shift = apart ? 0.4f : -0.4f;
+        bst_resolved_cell *two[2] = {&m.cells[2 * 8 + 3],
+                                     &m.cells[along_y ? 3 * 8 + 3 : 2 * 8 + 4]};
+        for (int i = 0; i < 2; i++) {
+            const float off = i ? shift : -shift;
+            *two[i] = (bst_resolved_cell){.light = 2.0f,
+                                          .moment_x = along_y ? 0.0f : 2.0f * off,
+                                          .moment_y = along_y ? 2.0f * off : 0.0f};
+        }
+        bst_shape_light_figures f;
+        bst_assert_ok(&ctx, bst_shape_light_measure(&ctx, &work, &m, sigma, &f));
+        const double d = apart ? 1.8 : 0.2, cross = exp(-0.25 * d * d / (sigma * sigma));
+        bst_assert_close(along_y ? f.yy : f.xx, 0.25 * d * d, 1e-6); /* floats */
+        bst_assert_close(along_y ? f.xx : f.yy, 0.0, 1e-6);
+        /* a grid of half a sigma */
+        bst_assert_close(f.snr_ratio, sqrt(0.5 + 0.5 * cross), 0.02);
+        free(m.cells);
+    }
+    bst_shape_light_free(&work);
+}
+
 static void no_light(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -311,6 +342,7 @@ static void outline_and_light_of_a_box(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(squares),
                                        cmocka_unit_test(two_points),
+                                       cmocka_unit_test(light_is_where_it_is_in_its_cell),
                                        cmocka_unit_test(no_light),
                                        cmocka_unit_test(a_body_during_the_exposure),
                                        cmocka_unit_test(light_of_materials),

@@ -165,6 +165,48 @@ static void other_edges_are_right(void **state) {
     bst_world_free(vignetted);
 }
 
+/* A uniform sky that is cut off by vignetting at the farthest corner of a sensor of 300 x 200
+ * pixels, whichever corner that is: each pixel has the sky's light or none, by its own distance. */
+static void vignetting_cuts_any_corner(void **state) {
+    (void)state;
+    static const double offset[4][2] = {{21, 9}, {-21, 9}, {21, -9}, {-21, -9}};
+    static const double beyond_px[] = {-60, -33, -20, -5, -1.5, 2};
+    for (int corner = 0; corner < 4; corner++) {
+        const double cx = 149.5 + offset[corner][0], cy = 99.5 + offset[corner][1];
+        const double far_px = hypot(fmax(cx, 299 - cx), fmax(cy, 199 - cy));
+        for (size_t k = 0; k < sizeof beyond_px / sizeof *beyond_px; k++) {
+            const double limit = far_px + beyond_px[k];
+            char text[1500];
+            snprintf(text, sizeof text,
+                     "{\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": "
+                     "\"neossat\", " TEST_NEOSSAT
+                     ", \"sensors\": [{\"camera\": {\"pixel_scale_arcsec\": 3, \"aperture_m\": "
+                     "0.15, \"width_px\": 300, \"height_px\": 200, \"background_mag_arcsec2\": 19, "
+                     "\"boresight_offset_px\": [%g, %g], \"optics\": {\"vignetting\": "
+                     "{\"limit_px\": %.6f}}}}]}]}",
+                     offset[corner][0], offset[corner][1], limit);
+            bst_world *world = test_world(text);
+            const bst_camera *camera = bst_world_camera(world, 0, 0);
+            bst_scene_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0.5 * BST_PI);
+            around.exposure_s = 100;
+            const double sky = 100 * bst_camera_background_e_per_s(camera);
+            bst_skylight *s;
+            const bst_skylight_map *map = make(world, &around, (bst_window){0, 0, 300, 200}, &s);
+            int dark = 0;
+            for (int i = 0; i < 300 * 200; i++) {
+                const double r = hypot(i % 300 - cx, i / 300 - cy);
+                const double e = r <= limit ? sky : 0.0;
+                /* floats */
+                bst_assert_close(bst_skylight_at(map, i % 300, i / 300), e, 1e-5 * sky);
+                dark += r > limit;
+            }
+            assert_true((dark > 0) == (beyond_px[k] < 0));
+            bst_skylight_free(s);
+            bst_world_free(world);
+        }
+    }
+}
+
 /* Background at the nodes (32, 32) and (0, 0), and at (63, 63), in the band lwir behind optics of
  * 300 K, 0.2 m, 3 arcsec, a throughput of 0.5 and 0.8 e per photon; vignetted. */
 static void lwir_background(const char *emissivity, const char *background,
@@ -298,6 +340,7 @@ int main(void) {
         cmocka_unit_test(places_agree_with_the_whole_map),
         cmocka_unit_test(interpolated_squares_are_right),
         cmocka_unit_test(other_edges_are_right),
+        cmocka_unit_test(vignetting_cuts_any_corner),
         cmocka_unit_test(warm_optics_count_once),
         cmocka_unit_test(heat_of_the_earth_is_vignetted),
         cmocka_unit_test(bounds_of_edges_hold),

@@ -180,7 +180,7 @@ static bst_status spans_of(bst_ctx *ctx, looking *l, double duration_s, bst_chec
             if ((was && !in) || (in && now >= duration_s)) {
                 if (out->count < out->capacity) {
                     out->items[out->count] =
-                        (bst_check_body_span){(bst_check_field_body)b, m->from_s, at};
+                        (bst_check_body_span){(bst_check_field_body)b, m->from_s, in ? now : at};
                 }
                 out->count++;
             }

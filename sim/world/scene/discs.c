@@ -257,13 +257,18 @@ double bst_discs_share(const bst_discs *discs, const bst_camera *camera, int bod
     if (!d->near) {
         return 0.0;
     }
-    int covered = 0;
+    int covered = 0, weight = 0;
     for (int i = 0; i < PLACES * PLACES; i++) {
-        double x = w.x0 - 0.5 + w.width * (i % PLACES) / (PLACES - 1.0);
-        double y = w.y0 - 0.5 + w.height * (i / PLACES) / (PLACES - 1.0);
-        covered += edge_at(d, body, middle, bst_camera_unproject(camera, x, y)) < 0.0;
+        const int column = i % PLACES, row = i / PLACES;
+        double x = w.x0 - 0.5 + w.width * column / (PLACES - 1.0);
+        double y = w.y0 - 0.5 + w.height * row / (PLACES - 1.0);
+        if (edge_at(d, body, middle, bst_camera_unproject(camera, x, y)) < 0.0) {
+            /* a place on a side stands for half a cell, in a corner for a quarter */
+            covered++;
+            weight += (column % (PLACES - 1) == 0 ? 1 : 2) * (row % (PLACES - 1) == 0 ? 1 : 2);
+        }
     }
-    double share = covered / (double)(PLACES * PLACES), x, y;
+    double share = weight / (4.0 * (PLACES - 1) * (PLACES - 1)), x, y;
     if (covered < 10 && body != BST_BODY_EARTH &&
         bst_camera_project(camera, d->centre[middle], &x, &y) && x > w.x0 - 0.5 && y > w.y0 - 0.5 &&
         x < w.x0 + w.width - 0.5 && y < w.y0 + w.height - 0.5) {
