@@ -136,8 +136,8 @@ static void motion_that_is_not_measured(void **state) {
         b->truth->items[0].snr = k == 1 ? 19.0 : 500.0;
         b->truth->items[0].flags |= k == 2 ? BST_TRUTH_SATURATED : 0u;
         b->g.fitted_sigma = k == 3 ? 0.26 * LENGTH : 0.85;
-        b->g.bend_x *= k == 4 ? 0.11 * LENGTH / BEND : 1.0;
-        b->g.bend_y *= k == 4 ? 0.11 * LENGTH / BEND : 1.0;
+        b->g.bend_x *= k == 4 ? 0.51 * LENGTH / BEND : 1.0;
+        b->g.bend_y *= k == 4 ? 0.51 * LENGTH / BEND : 1.0;
         bst_generator_measure_motion(&b->g, &b->frame);
         bst_assert_close(b->g.fit_path.dx, b->g.star_path.dx, 0.0);
         bst_assert_close(b->g.fit_path.dy, b->g.star_path.dy, 0.0);
@@ -147,10 +147,35 @@ static void motion_that_is_not_measured(void **state) {
     }
 }
 
+/* Paths with a third of their length as bend, and in uneven frames paths of 3 sigma of the PSF, are
+ * measured, as image processing does (sim/onboard/measured_path.h): the variance of their ends is
+ * that of the light of both, 8 S L / Q, with the telemetry's. */
+static void bent_and_short_paths(void **state) {
+    (void)state;
+    for (int k = 0; k < 4; k++) {
+        const bool bent = k < 2, measured = bent || k == 3;
+        bench *b = make(2, 2e4);
+        set_path(b, 1.3, -0.9, 0.25);
+        b->g.bend_x *= bent ? 0.33 * LENGTH / BEND : 1.0;
+        b->g.bend_y *= bent ? 0.33 * LENGTH / BEND : 1.0;
+        b->g.fitted_sigma = bent ? 0.85 : LENGTH / 3.0;
+        b->g.followed = k % 2;
+        bst_generator_measure_motion(&b->g, &b->frame);
+        const double norm = bst_crlb_table_norm(&b->g.bound, LENGTH);
+        const double q = 4e8 / (1.0 + sqrt(2.0) * 8e5 * norm * norm / (4 * 15.0 + 49.0));
+        const double ends2 = 8.0 * 0.9 * LENGTH / q;
+        assert_int_equal(b->g.fit_path.dx != b->g.star_path.dx, measured);
+        assert_int_equal(b->g.bend_after < b->g.bend_before, measured);
+        bst_assert_close(b->g.ends_after, measured ? sqrt(ends2 / (1.0 + 4.0 * ends2)) : 0.0, 1e-9);
+        drop(b);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shares_of_a_path),
         cmocka_unit_test(motion_that_is_not_measured),
+        cmocka_unit_test(bent_and_short_paths),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
