@@ -67,6 +67,17 @@ static void project(const bst_generator *g, double c, double s, double *along, d
     *bend = sums[2] / square;
 }
 
+/* True if images show stars as streaks: the motion is measured on maxima of the streak filter. Of a
+ * path that dwells for most of the exposure the point filter's output is larger. */
+static bool are_streaks(const bst_generator *g) {
+    if (!g->followed) {
+        return true;
+    }
+    const bst_path_widths widths = {g->image_sigma, g->filter_sigma, g->bias_sigma};
+    const bst_path_outputs out = bst_path_fit_outputs(&g->path, g->star_path, &widths);
+    return out.streak > out.point;
+}
+
 void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f) {
     g->fit_path = g->star_path;
     g->fit_bend_x = g->bend_x;
@@ -78,7 +89,8 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
     g->ends_after = 0.0;
     double snr2 = snr2_of_stars(g, f->truth), length = g->streak;
     if (g->smeared || g->path.count < 3 || !(length > 0.0) || !(snr2 > 0.0) ||
-        !bst_path_is_measured(length, hypot(g->bend_x, g->bend_y), g->fitted_sigma, g->followed)) {
+        !bst_path_is_measured(length, hypot(g->bend_x, g->bend_y), g->fitted_sigma, g->followed) ||
+        !are_streaks(g)) {
         return;
     }
     double c = g->star_path.dx / length, s = g->star_path.dy / length, along, across, bend;

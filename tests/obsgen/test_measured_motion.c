@@ -51,12 +51,14 @@ static bench *make(int binning, double snr) {
     g->key = bst_rng_make_key(5, 0, "test", "motion");
     g->total_sigma = 0.9;
     g->fitted_sigma = 0.85;
+    g->image_sigma = g->filter_sigma = 0.9;
+    g->bias_sigma = 1.27;
     bst_crlb_table_init(&g->bound, 0.85);
     g->streak = LENGTH;
     g->star_path = (bst_obsgen_path_px){LENGTH * cos(DIRECTION), LENGTH * sin(DIRECTION)};
     g->bend_x = BEND * cos(DIRECTION);
     g->bend_y = BEND * sin(DIRECTION);
-    g->path.count = NODES;
+    g->path = (bst_star_trail_path){b->x, b->y, NODES};
     g->path_x = b->x;
     g->path_y = b->y;
     b->frame = (bst_generator_frame){.truth = b->truth, .bend_sigma_px = 0.5};
@@ -171,11 +173,31 @@ static void bent_and_short_paths(void **state) {
     }
 }
 
+/* A path that rests at its end for nine tenths of the exposure is a point to the filters: images
+ * have no streak to measure the motion on. */
+static void paths_that_dwell(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        bench *b = make(1, 2e4);
+        for (int n = 0; n < NODES; n++) {
+            const double u = (double)n / (NODES - 1), rest = k ? 0.1 : 1.0;
+            const double at = LENGTH * (u < rest ? u / rest - 1.0 + 0.5 * rest : 0.5 * rest);
+            b->x[n] = at * cos(DIRECTION);
+            b->y[n] = at * sin(DIRECTION);
+        }
+        b->g.followed = true;
+        bst_generator_measure_motion(&b->g, &b->frame);
+        assert_int_equal(b->g.bend_after < b->g.bend_before, k == 0);
+        drop(b);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shares_of_a_path),
         cmocka_unit_test(motion_that_is_not_measured),
         cmocka_unit_test(bent_and_short_paths),
+        cmocka_unit_test(paths_that_dwell),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
