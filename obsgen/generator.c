@@ -580,6 +580,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
                                   .streak_px = g->streak * g->binning,
                                   .bend_before_px = g->bend_before * g->binning,
                                   .bend_after_px = g->bend_after * g->binning,
+                                  .ends_after_px = g->ends_after * g->binning,
                                   .smeared = g->smeared,
                                   .shared_dx_px = g->fit_path.dx,
                                   .shared_dy_px = g->fit_path.dy};

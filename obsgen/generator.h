@@ -98,7 +98,8 @@ typedef struct bst_generator_result {
     double faint_light_e, faint_square_e2;
     double streak_px;                     /* streak length of the star filter; sensor px */
     double bend_before_px, bend_after_px; /* 1 sigma of the bend, without and with bright streaks */
-    bool smeared;                         /* stars moved further than is filtered for */
+    double ends_after_px; /* 1 sigma of end minus start by bright streaks, per axis; 0: by none */
+    bool smeared;         /* stars moved further than is filtered for */
     /* displacement that all streaks of stars share: direction of the streaks, and variances along
      * and across it, sensor px */
     double shared_dx_px, shared_dy_px, shared_along_px2, shared_across_px2;

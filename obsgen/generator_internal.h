@@ -118,6 +118,7 @@ struct bst_generator {
     double fit_bend_x, fit_bend_y;
     double bend_before,
         bend_after;           /* 1 sigma of the unknown bend without and with bright streaks */
+    double ends_after;        /* 1 sigma of the measured length and of end minus start across */
     bst_star_trail_path path; /* true path; count 0: unknown */
     double *path_x, *path_y, *object_x, *object_y;
     int path_room;

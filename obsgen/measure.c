@@ -3,6 +3,9 @@
 #include "obsgen/generator_internal.h"
 #include "obsgen/model/place_error.h"
 
+/* From which difference images find that a streak has another path than the stars', px, share of
+ * theirs, and gain of chi-square (imgproc/measure/other_path.c). */
+static const double OTHER_PX = 1.0, OTHER_SHARE = 0.05, OTHER_GAIN = 25.0;
 /* Lower limit of the visible share used for errors. */
 static const double LEAST_SEEN = 0.02;
 /* Draws of a point's error until its maximum exceeds the threshold, and their number's place in
@@ -275,6 +278,23 @@ double bst_generator_fit_norm(const bst_generator *g, const generator_source *s,
     return norm / g->noise_e * s->snr_ratio;
 }
 
+/* True if image processing finds that a streak is no star's (imgproc/measure/other_path.h): by the
+ * light that the stars' path leaves of it. */
+static bool is_of_other_path(const bst_generator *g, const generator_source *s, bool as_streak,
+                             const bst_detection *d) {
+    const unsigned unclear = BST_DETECTION_BLEND | BST_DETECTION_EDGE | BST_DETECTION_SATURATED;
+    if (!(g->streak > 0.0) || s->star || !(d->flags & BST_DETECTION_STREAK) ||
+        (d->flags & unclear) || d->snr < GENERATOR_MOMENTS_SNR) {
+        return false;
+    }
+    const bst_obsgen_path_px *own = &s->path, *stars = &g->straight_path;
+    const double apart = fmin(hypot(own->dx - stars->dx, own->dy - stars->dy),
+                              hypot(own->dx + stars->dx, own->dy + stars->dy));
+    const double same = bst_matched_efficiency(*own, *stars, g->total_sigma);
+    return !as_streak || (apart > OTHER_PX + OTHER_SHARE * g->streak &&
+                          (1.0 - same * same) * d->snr * d->snr > OTHER_GAIN);
+}
+
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
                                     const generator_blend *b) {
     bst_detection d = {0};
@@ -315,6 +335,9 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     }
     if (s->x < -0.5 || s->y < -0.5 || s->x > g->width - 0.5 || s->y > g->height - 0.5) {
         fit_visible_part(g, s, &d);
+    }
+    if (is_of_other_path(g, s, s->as_streak && !b->point, &d)) {
+        d.flags |= BST_DETECTION_OTHER_PATH;
     }
     return d;
 }

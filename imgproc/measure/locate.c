@@ -8,6 +8,7 @@
 #include "imgproc/detect/blooming.h"
 #include "imgproc/measure/cosmic_ray.h"
 #include "imgproc/measure/light_scale.h"
+#include "imgproc/measure/other_path.h"
 #include "imgproc/measure/own_path.h"
 #include "imgproc/measure/pair_split.h"
 #include "imgproc/measure/peak_centroid.h"
@@ -471,6 +472,7 @@ static void finish_source(const bst_imgproc_worker *w, int i, bst_imgproc_found 
          found->length_px > 1.5 * drawn_fwhm_px(f, &found->source.shape))) {
         found->flags |= BST_DETECTION_STREAK;
     }
+    bst_other_path_judge(w, i, found);
 }
 
 /* Selects the brightest candidates into l->from: `fits` of them in order of brightness, the others

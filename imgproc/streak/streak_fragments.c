@@ -464,7 +464,7 @@ static void replace(bst_streak_fragments *j, const view *v, int i, const line *a
     s->dropped = false;
     s->streak = s->own_streak = s->joined = true;
     s->rough = false;
-    s->flags = flags;
+    s->flags = flags | (v->f->filter->streak ? BST_DETECTION_OTHER_PATH : 0u);
     s->label = BST_LABEL_UNKNOWN;
     s->label_probability = 0.0;
     s->source =

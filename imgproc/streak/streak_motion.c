@@ -7,15 +7,12 @@
 
 #include "imgproc/measure/peak_centroid.h"
 #include "sim/core/cholesky.h"
+#include "sim/onboard/measured_path.h"
 
 /* Least SNR of a streak used for the motion. */
 static const double LEAST_SNR = 20.0;
 /* Largest relative brightness of a neighbour that does not bias a streak. */
 static const double ALONE_SHARE = 0.02;
-static const double LEAST_PATH_SIGMAS = 4.0, LEAST_UNEVEN_SIGMAS = 2.0;
-/* Largest bend relative to the path length that can be treated as a correction to uniform motion.
- */
-static const double MOST_BEND = 0.5;
 /* A motion with a smaller correction needs no third round. */
 static const double SMALL_STEP_PX = 0.2;
 /* Rejection limit: chi-square, COMMON degrees of freedom, of a star's motion against the common
@@ -315,9 +312,7 @@ bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *f)
     work->ey = dy / length;
     work->binning = f->binning;
     work->sigma_px = f->sigma_px;
-    const double least = f->uneven ? LEAST_UNEVEN_SIGMAS : LEAST_PATH_SIGMAS;
-    return length >= least * f->sigma_px * f->binning &&
-           hypot(bend_x, bend_y) <= MOST_BEND * length;
+    return bst_path_is_measured(length, hypot(bend_x, bend_y), f->sigma_px * f->binning, f->uneven);
 }
 
 void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *f,

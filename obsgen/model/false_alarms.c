@@ -183,6 +183,9 @@ void bst_false_alarms_cosmic_rays(bst_generator *g) {
             d->length_px = g->binning * length;
             d->angle_rad = atan(tan(angle));
             d->flags |= BST_DETECTION_STREAK;
+            /* imgproc/measure/other_path.h */
+            d->flags |=
+                g->streak > 0.0 && peak >= GENERATOR_MOMENTS_SNR ? BST_DETECTION_OTHER_PATH : 0u;
         }
         bst_generator_keep(g, &item);
     }

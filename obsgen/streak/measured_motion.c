@@ -5,11 +5,11 @@
 #include "boresight/camera_motion.h"
 #include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
+#include "sim/onboard/measured_path.h"
 
-/* Stars that are used, and the least SNR of one. Shorter paths, in sigmas of the PSF, and paths
- * that bend by a larger share of their length are not measured. */
+/* Stars that are used, and the least SNR of one. */
 enum { MOST_STARS = 12 };
-static const double LEAST_SNR = 20.0, LEAST_PATH_SIGMAS = 4.0, MOST_BEND = 0.1;
+static const double LEAST_SNR = 20.0;
 /* 1 sigma of the telemetry's error of length and direction that image processing expects, px
  * (imgproc/detect/camera_motion_left.c). */
 static const double DRIFT_PX = 1.0;
@@ -67,6 +67,17 @@ static void project(const bst_generator *g, double c, double s, double *along, d
     *bend = sums[2] / square;
 }
 
+/* True if images show stars as streaks: the motion is measured on maxima of the streak filter. Of a
+ * path that dwells for most of the exposure the point filter's output is larger. */
+static bool are_streaks(const bst_generator *g) {
+    if (!g->followed) {
+        return true;
+    }
+    const bst_path_widths widths = {g->image_sigma, g->filter_sigma, g->bias_sigma};
+    const bst_path_outputs out = bst_path_fit_outputs(&g->path, g->star_path, &widths);
+    return out.streak > out.point;
+}
+
 void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f) {
     g->fit_path = g->star_path;
     g->fit_bend_x = g->bend_x;
@@ -75,9 +86,11 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
                                                      g->settings.motion_bend_px, f->bend_sigma_px) /
                    g->binning;
     g->bend_before = g->bend_after = prior;
+    g->ends_after = 0.0;
     double snr2 = snr2_of_stars(g, f->truth), length = g->streak;
-    if (g->smeared || g->path.count < 3 || !(length >= LEAST_PATH_SIGMAS * g->fitted_sigma) ||
-        hypot(g->bend_x, g->bend_y) > MOST_BEND * length || !(snr2 > 0.0)) {
+    if (g->smeared || g->path.count < 3 || !(length > 0.0) || !(snr2 > 0.0) ||
+        !bst_path_is_measured(length, hypot(g->bend_x, g->bend_y), g->fitted_sigma, g->followed) ||
+        !are_streaks(g)) {
         return;
     }
     double c = g->star_path.dx / length, s = g->star_path.dy / length, along, across, bend;
@@ -90,6 +103,7 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
     g->bend_after = sqrt(share * error2);
     double ends2 = 8.0 * g->total_sigma * length / snr2, drift = DRIFT_PX / g->binning;
     double whole = drift * drift / (drift * drift + ends2);
+    g->ends_after = sqrt(whole * ends2);
     double noise =
         share * sqrt(error2) * bst_rng_normal(g->key, (uint64_t)f->truth->exposure_id, BEND_ERROR);
     double more = share * (bend - reported) + noise, dx = whole * (along - length);
@@ -109,7 +123,8 @@ void bst_generator_set_shared(const bst_camera_motion *motion, const bst_camera 
     }
     const double length = hypot(made->shared_dx_px, made->shared_dy_px);
     const double after2 = made->bend_after_px * made->bend_after_px;
-    const double covariance[3][3] = {{0.0}, {0.0}, {0.0, 0.0, after2}};
+    const double ends2 = made->ends_after_px * made->ends_after_px;
+    const double covariance[3][3] = {{ends2}, {0.0, ends2}, {0.0, 0.0, after2}};
     const bool measured = length > 0.0 && made->bend_after_px < made->bend_before_px;
     const bst_camera_motion_unknown unknown = {.bend_px = made->bend_before_px,
                                                .drift_px = BST_CAMERA_MOTION_DRIFT_PX,

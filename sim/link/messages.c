@@ -262,7 +262,8 @@ static const bst_wire_field detection_items[] = {
     ANY(bst_detection, v_mag, "mag", "V."),
     ANY(bst_detection, v_mag_sigma, "mag", "1 sigma of it; infinite without light."),
     BITS(bst_detection, flags,
-         "1 saturated, 2 edge, 4 streak, 8 blend, 16 stack, 32 bloom, 64 extended."),
+         "1 saturated, 2 edge, 4 streak, 8 blend, 16 stack, 32 bloom, 64 extended, "
+         "128 other path."),
     BITS(bst_detection, star_id, "Identity in the star catalogue, 0 when none."),
     INT(bst_detection, label, 0, 5, "",
         "0 unknown, 1 star, 2 object, 3 artefact, 4 hot pixel, 5 radiation hit."),
@@ -283,7 +284,8 @@ static const bst_wire_field detection_items[] = {
     BOUNDED(bst_detection, extent.phase_rad, 0, 3.1416, "rad",
             "Sun - target - observer, by the onboard Sun."),
     BOUNDED(bst_detection, extent.saturated_share, 0, 1, "", "Of the area, that is saturated."),
-    BOUNDED(bst_detection, extent.range_m, 0, 1e15, "m", "From the known size or model; 0: not known."),
+    BOUNDED(bst_detection, extent.range_m, 0, 1e15, "m",
+            "From the known size or model; 0: not known."),
     BOUNDED(bst_detection, extent.range_sigma_m, 0, 1e15, "m", "1 sigma of it."),
     END};
 

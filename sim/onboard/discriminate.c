@@ -494,7 +494,8 @@ static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, dou
     if (item->flags & BST_DETECTION_EDGE) {
         set_label(item, BST_LABEL_ARTEFACT, 0.9);
     } else if (f->streak_px >= STREAK_PX) {
-        bool drawn = (item->flags & BST_DETECTION_STREAK) != 0;
+        const unsigned shape = item->flags & (BST_DETECTION_STREAK | BST_DETECTION_OTHER_PATH);
+        const bool drawn = shape == BST_DETECTION_STREAK;
         set_label(item, drawn ? BST_LABEL_STAR : BST_LABEL_OBJECT, drawn ? 0.9 : 0.95);
     } else if ((again < 0 || d->sources[again].moved) && is_long_streak(item)) {
         set_label(item, BST_LABEL_OBJECT, 0.95);

@@ -57,8 +57,8 @@ void bst_discriminator_archive(bst_discriminator *discriminator, bst_archive *ar
  *            For the others the first rule that applies counts:
  *            1. cut by the edge: ARTEFACT;
  *            2. at the predicted position of a moving track: OBJECT;
- *            3. in a frame that does not follow the stars: a streak like the stars' is a STAR, a
- *            point is an OBJECT;
+ *            3. in a frame that does not follow the stars: a streak is a STAR unless its path
+ *            is another one than the stars', and a point is an OBJECT;
  *            4. stars are points, and the source is three times as long as wide and was not at rest
  *            there before: OBJECT;
  *            5. earlier frames had a source of its brightness at the same position of the sky: STAR

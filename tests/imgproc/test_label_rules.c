@@ -268,6 +268,9 @@ static void shapes(void **state) {
         {BST_DETECTION_STREAK, 5.9, 2, 0, BST_LABEL_OBJECT, 1 - (1 - 0.9)}, /* one of ten: 0.909 */
         {BST_DETECTION_STREAK, 9, 2, 3.0, BST_LABEL_STAR, 0.9},
         {0, 2, 2, 3.0, BST_LABEL_OBJECT, 0.95},
+        {BST_DETECTION_STREAK | BST_DETECTION_OTHER_PATH, 9, 2, 3.0, BST_LABEL_OBJECT, 0.95},
+        {BST_DETECTION_STREAK | BST_DETECTION_EDGE | BST_DETECTION_OTHER_PATH, 9, 2, 3.0,
+         BST_LABEL_ARTEFACT, 0.9},
         {BST_DETECTION_STREAK | BST_DETECTION_EDGE, 9, 2, 3.0, BST_LABEL_ARTEFACT, 0.9},
     };
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {

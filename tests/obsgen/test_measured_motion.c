@@ -51,12 +51,14 @@ static bench *make(int binning, double snr) {
     g->key = bst_rng_make_key(5, 0, "test", "motion");
     g->total_sigma = 0.9;
     g->fitted_sigma = 0.85;
+    g->image_sigma = g->filter_sigma = 0.9;
+    g->bias_sigma = 1.27;
     bst_crlb_table_init(&g->bound, 0.85);
     g->streak = LENGTH;
     g->star_path = (bst_obsgen_path_px){LENGTH * cos(DIRECTION), LENGTH * sin(DIRECTION)};
     g->bend_x = BEND * cos(DIRECTION);
     g->bend_y = BEND * sin(DIRECTION);
-    g->path.count = NODES;
+    g->path = (bst_star_trail_path){b->x, b->y, NODES};
     g->path_x = b->x;
     g->path_y = b->y;
     b->frame = (bst_generator_frame){.truth = b->truth, .bend_sigma_px = 0.5};
@@ -136,8 +138,8 @@ static void motion_that_is_not_measured(void **state) {
         b->truth->items[0].snr = k == 1 ? 19.0 : 500.0;
         b->truth->items[0].flags |= k == 2 ? BST_TRUTH_SATURATED : 0u;
         b->g.fitted_sigma = k == 3 ? 0.26 * LENGTH : 0.85;
-        b->g.bend_x *= k == 4 ? 0.11 * LENGTH / BEND : 1.0;
-        b->g.bend_y *= k == 4 ? 0.11 * LENGTH / BEND : 1.0;
+        b->g.bend_x *= k == 4 ? 0.51 * LENGTH / BEND : 1.0;
+        b->g.bend_y *= k == 4 ? 0.51 * LENGTH / BEND : 1.0;
         bst_generator_measure_motion(&b->g, &b->frame);
         bst_assert_close(b->g.fit_path.dx, b->g.star_path.dx, 0.0);
         bst_assert_close(b->g.fit_path.dy, b->g.star_path.dy, 0.0);
@@ -147,10 +149,55 @@ static void motion_that_is_not_measured(void **state) {
     }
 }
 
+/* Paths with a third of their length as bend, and in uneven frames paths of 3 sigma of the PSF, are
+ * measured, as image processing does (sim/onboard/measured_path.h): the variance of their ends is
+ * that of the light of both, 8 S L / Q, with the telemetry's. */
+static void bent_and_short_paths(void **state) {
+    (void)state;
+    for (int k = 0; k < 4; k++) {
+        const bool bent = k < 2, measured = bent || k == 3;
+        bench *b = make(2, 2e4);
+        set_path(b, 1.3, -0.9, 0.25);
+        b->g.bend_x *= bent ? 0.33 * LENGTH / BEND : 1.0;
+        b->g.bend_y *= bent ? 0.33 * LENGTH / BEND : 1.0;
+        b->g.fitted_sigma = bent ? 0.85 : LENGTH / 3.0;
+        b->g.followed = k % 2;
+        bst_generator_measure_motion(&b->g, &b->frame);
+        const double norm = bst_crlb_table_norm(&b->g.bound, LENGTH);
+        const double q = 4e8 / (1.0 + sqrt(2.0) * 8e5 * norm * norm / (4 * 15.0 + 49.0));
+        const double ends2 = 8.0 * 0.9 * LENGTH / q;
+        assert_int_equal(b->g.fit_path.dx != b->g.star_path.dx, measured);
+        assert_int_equal(b->g.bend_after < b->g.bend_before, measured);
+        bst_assert_close(b->g.ends_after, measured ? sqrt(ends2 / (1.0 + 4.0 * ends2)) : 0.0, 1e-9);
+        drop(b);
+    }
+}
+
+/* A path that rests at its end for nine tenths of the exposure is a point to the filters: images
+ * have no streak to measure the motion on. */
+static void paths_that_dwell(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        bench *b = make(1, 2e4);
+        for (int n = 0; n < NODES; n++) {
+            const double u = (double)n / (NODES - 1), rest = k ? 0.1 : 1.0;
+            const double at = LENGTH * (u < rest ? u / rest - 1.0 + 0.5 * rest : 0.5 * rest);
+            b->x[n] = at * cos(DIRECTION);
+            b->y[n] = at * sin(DIRECTION);
+        }
+        b->g.followed = true;
+        bst_generator_measure_motion(&b->g, &b->frame);
+        assert_int_equal(b->g.bend_after < b->g.bend_before, k == 0);
+        drop(b);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shares_of_a_path),
         cmocka_unit_test(motion_that_is_not_measured),
+        cmocka_unit_test(bent_and_short_paths),
+        cmocka_unit_test(paths_that_dwell),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

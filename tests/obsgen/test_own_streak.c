@@ -46,7 +46,46 @@ static void objects_across_the_stars_are_streaks(void **state) {
     close_scene(&s);
 }
 
+/* Uniform paths among streaks of stars along (20, -9): those that images would tell from a star's
+ * by 5 sigma. The SNR is that of the object's own path; the light that the stars' path leaves of it
+ * is (1 - r^2) of it, r the correlation of both images: 0.7 of half a path, 0.13 of 0.8 of it. */
+static void streaks_of_another_path(void **state) {
+    (void)state;
+    static const struct {
+        double share, turn, snr;
+        bool star, streak, other;
+    } cases[] = {{1.0, 0.0, 800, false, true, false}, {1.0, 0.0, 800, true, true, false},
+                 {0.5, 0.0, 800, true, true, false},  {0.5, 0.0, 800, false, true, true},
+                 {0.5, 0.0, 25, false, true, false},  {0.8, 0.0, 800, false, true, true},
+                 {0.8, 0.0, 40, false, true, false},  {1.0, 0.5, 800, false, true, true},
+                 {1.0, -0.5, 800, false, true, true}, {-1.0, 0.0, 800, false, true, false},
+                 {0.0, 0.0, 800, false, false, false}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        const double dx = 20.0, dy = -9.0, c = cases[k].share * cos(cases[k].turn);
+        const double n = cases[k].share * sin(cases[k].turn);
+        scene s;
+        open_scene(&s);
+        start(&s);
+        s.frame.streak_dx_px = dx;
+        s.frame.streak_dy_px = dy;
+        bst_truth_item *t = add_source(&s, 1, 500.3, 400.6, electrons_of(&s, cases[k].snr));
+        t->kind = cases[k].star ? BST_SOURCE_STAR : BST_SOURCE_OBJECT;
+        t->x_start_px -= 0.5 * (c * dx - n * dy);
+        t->x_end_px += 0.5 * (c * dx - n * dy);
+        t->y_start_px -= 0.5 * (n * dx + c * dy);
+        t->y_end_px += 0.5 * (n * dx + c * dy);
+        bst_generator_result r = run(&s, 0);
+        assert_int_equal(r.count, 1);
+        const unsigned flags = r.items[0].detection.flags;
+        printf("%zu: SNR %.1f, flags %u\n", k, r.items[0].detection.snr, flags);
+        assert_int_equal((flags & BST_DETECTION_STREAK) != 0, cases[k].streak);
+        assert_int_equal((flags & BST_DETECTION_OTHER_PATH) != 0, cases[k].other);
+        close_scene(&s);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(objects_across_the_stars_are_streaks)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(objects_across_the_stars_are_streaks),
+                                       cmocka_unit_test(streaks_of_another_path)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

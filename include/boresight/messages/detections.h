@@ -27,6 +27,8 @@ enum {
     BST_DETECTION_STACK = 1u << 4, /* detected in a stack of frames that ends with this one */
     /* larger than the PSF: x_px and y_px are its estimated centre of mass, see extent */
     BST_DETECTION_EXTENDED = 1u << 6,
+    /* streak among streaks of stars whose length or direction is another one than theirs */
+    BST_DETECTION_OTHER_PATH = 1u << 7,
 };
 
 /* Measures of an extended target, full-sensor coordinates; all 0 without BST_DETECTION_EXTENDED. */
