@@ -33,6 +33,7 @@ FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "kept")
 LINES_SHOWN = 40
 # Inputs, durations, states of one version, what gnuplot and its fonts draw, raw bytes
 LEFT_OUT = ("scenario.json", "study.json", "wall_clock.csv", "pointing.png", "plot.png", "link.packets")
+PROGRESS = re.compile(r"\d of \d+ .*, \d+ a second")  # lines of what takes some seconds
 TRIES = 3  # of a run that is to be killed before it ends
 ENDINGS_LEFT_OUT = (".mp4", ".state", ".rows")
 FIGURES = kept_columns.FIGURES
@@ -111,7 +112,7 @@ class Kept:
         if text:
             end = ".json" if result.stdout[:1] in ("{", "[") else ".txt"
             self.columns.put_bytes(f"{name} says", result.stdout.encode(), end)
-        self.columns.put_lines(f"{name} warns", result.stderr)
+        self.columns.put_lines(f"{name} warns", "\n".join(line for line in result.stderr.split("\n") if not PROGRESS.search(line)))
         if os.environ.get("KEPT_SHOW") and result.returncode:
             print(name, result.stderr[:600], result.stdout[-600:], file=sys.stderr)
         for path in adds:

@@ -110,8 +110,10 @@ class Listed(Library):
         place = super().write(path)
         with open(place, encoding="utf-8") as file:
             text = file.read()
+        text = text[text.index("#endif\n") + len("#endif\n"):]
+        first = re.search(r"^#include", text, re.M).start()  # after what the file defines for its headers
         with open(place, "w", encoding="utf-8") as file:
-            file.write(CHOICE + text[text.index("#endif\n") + len("#endif\n"):])
+            file.write(text[:first] + CHOICE + text[first:])
         return place
 
 
