@@ -396,6 +396,6 @@ def starry():
     scene = changed(track(), {**SMALL, "/duration_s": 6, SENSOR + "/camera/aperture_m": 0.3, SENSOR + "/camera/rotation_deg": -37,
                               SENSOR + "/camera/pixel_scale_arcsec": 14, "/world/faint_stars": "statistical", "/world/faint_limit_v_mag": 14,
                               SENSOR + "/knowledge/star_catalogue": "embedded", "/record/compression": "none",
-                              SENSOR + "/camera/distortion": {"k1": -40, "p1": 0.2}})
+                              SENSOR + "/camera/distortion": {"k1": -40, "p1": 0.2}, SENSOR + "/exposure/window_px": [16, 8, 276, 216]})
     scene["name"] = "stars"
     return scene

@@ -400,10 +400,12 @@ def scene_measured(k):
         k.call(name, "pd", *words, "--pair", "--snr", "60", "--ratio", "2", "--separation", "1.2,1.9", "--false-splits", "0.01", "--threads", "1",
                "--json", k.path("pd.json"), "--plot", k.path("pd.png"), text=False, adds=[k.path("pd.json")])
         k.add_script(name + " plot", k.path("pd.png"))
-    k.write("study.json", {"boresight_study": 1, "seed": "0x53", "name": "pd", "kind": "pd", "scenarios": [{"file": gaussian}], "replicates": 2,
-                           "resamples": 100, "pd": {"snr_first": 5, "snr_last": 9, "snr_step": 4, "trials": 12, "false_alarms_per_frame": 4, "empty_frames": 5},
-                           "sweeps": [{"axes": [{"path": kept_scenes.SENSOR + "/camera/read_noise_e", "values": [5, 25]},
-                                                {"path": "/pd/streak_px", "values": [0, 6]}]}]})
+    turned = k.write("turned.json", kept_scenes.changed(scene, {"/name": "turned", kept_scenes.SENSOR + "/camera/rotation_deg": 75,
+                                                                kept_scenes.SENSOR + "/camera/aperture_m": 0.2}))
+    k.write("study.json", {"boresight_study": 1, "seed": "0x53", "name": "pd", "kind": "pd", "scenarios": [{"file": gaussian}, {"file": turned}],
+                           "resamples": 100, "pd": {"snr_first": 5, "snr_last": 9, "snr_step": 4, "trials": 12, "false_alarms_per_frame": 4, "empty_frames": 5,
+                                                    "known_rate": True, "min_separation_px": 31, "background_e": 40, "jitter_px": 0.2},
+                           "sweeps": [{"axes": [{"path": "/pd/streak_px", "values": [4, 6]}]}]})
     k.call("study", "study", k.path("study.json"), "--out", k.path("study"), "--quiet", "--workers", "1", text=False)
     for name in sorted(n for n in os.listdir(k.path("study")) if n.endswith(".csv")):
         k.add("study " + name, os.path.join(k.path("study"), name))
