@@ -398,4 +398,5 @@ def starry():
                               SENSOR + "/knowledge/star_catalogue": "embedded", "/record/compression": "none",
                               SENSOR + "/camera/distortion": {"k1": -40, "p1": 0.2}, SENSOR + "/exposure/window_px": [16, 8, 276, 216]})
     scene["name"] = "stars"
+    scene["world"]["objects"][0]["burns"] = [{"time_s": 2.33, "dv_rtn_mps": [0.2, -0.1, 0.3]}]
     return scene

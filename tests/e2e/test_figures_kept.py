@@ -427,7 +427,7 @@ def scene_sensor(k):
     """A sensor and a camera from frames of their own."""
     k.draw_scripts()
     scene = k.write("sensor.json", kept_scenes.sensor())
-    for folder, words in (("cal", ["--bias", "4", "--dark", "5", "--flat", "4", "--linearity", "5"]),
+    for folder, words in (("cal", ["--bias", "4", "--dark", "5", "--flat", "4", "--linearity", "6"]),
                           ("warm", ["--bias", "0", "--dark", "4", "--flat", "0", "--set", kept_scenes.SENSOR + "/camera/dark_current_e_per_s=40"])):
         k.call(folder, "calframes", scene, "--out", k.path(folder), "--exposure", "4", "--threads", "1", *words)
     names = {f"{folder} {n.rsplit('_', 1)[1][:-5]}": os.path.join(k.path(folder), n) for folder in ("cal", "warm") for n in os.listdir(k.path(folder))}
@@ -439,7 +439,7 @@ def scene_sensor(k):
         k.add_script(name + " plot", os.path.join(k.path(name), "plot.png"))
     k.call("loop", "loop", scene, "--plot", k.path("loop.png"), text=False)
     k.add_script("loop plot", k.path("loop.png"))
-    k.run("stars", kept_scenes.starry())
+    k.export("oem", k.run("stars", kept_scenes.starry()), "--orbits", "oem", "--step", "0.2")
     k.call("camera", "calibrate-camera", k.path("stars"), "--out", k.path("camera"), "--psf-columns", "1", "--psf-rows", "1", "--psf-radius", "7",
            adds=[k.path("camera")])
     k.call("images and generator", "calibrate-obsgen", "--check", k.path("stars.json"), "--seeds", "2", "--duration", "3", "--json", k.path("check.json"),
