@@ -51,8 +51,25 @@ static void fill(bst_truth *truth, const bst_crlb_table *bound, int64_t exposure
     }
 }
 
+/* Gives three of four clear detections the star on whose place in the grid they lie, and all others
+ * another one; counts the clear ones and those that are right. */
+static void identify(const bst_truth *truth, double threshold_snr, int number, bst_detection *d,
+                     int counts[2]) {
+    int i = (int)lround((d->x_px - 25.5) / 36.0) + 27 * (int)lround((d->y_px - 25.5) / 36.0);
+    d->star_id = 1;
+    if (i >= 0 && i < SOURCES) {
+        const bst_truth_item *t = &truth->items[i];
+        bool near = hypot(d->x_px - t->x_centroid_px, d->y_px - t->y_centroid_px) < 2.0;
+        bool clear = t->snr > threshold_snr + 2.0, right = clear && number % 4 > 0;
+        d->star_id = right ? t->id : t->id + 1;
+        counts[0] += near && clear;
+        counts[1] += near && right;
+    }
+}
+
 static void known_factors_are_found(void **state) {
     (void)state;
+    int identified[2] = {0, 0};
     bst_ctx ctx = {0};
     bst_crlb_table bound;
     bst_crlb_table_init(&bound, SIGMA);
@@ -106,8 +123,10 @@ static void known_factors_are_found(void **state) {
         detections->noise_e = r.noise_e;
         detections->threshold_snr = r.threshold_snr;
         detections->count = r.count;
+        detections->stars_identified = 1;
         for (int i = 0; i < r.count; i++) {
             detections->items[i] = r.items[i].detection;
+            identify(truth, r.threshold_snr, i, &detections->items[i], identified);
         }
         bst_assert_ok(&ctx, bst_calibration_fitter_add(&ctx, calibrator, truth, detections, 0.5));
     }
@@ -127,6 +146,9 @@ static void known_factors_are_found(void **state) {
     bst_assert_close(found.across_factor[1], 1.15, 0.06);
     bst_assert_close(found.across_factor[3], 1.15, 0.04);
     bst_assert_close(found.phase_bias_px, 0.0, 0.005);
+    /* all but a few that lie beside their star */
+    assert_true(identified[0] > 5000);
+    bst_assert_close(found.star_id_probability, (double)identified[1] / identified[0], 0.005);
     free(truth);
     free(detections);
     bst_calibration_fitter_free(calibrator);

@@ -208,6 +208,16 @@ static void test_too_few_stars(void **state) {
     assert_int_equal(bst_effective_psf_fit(&ctx, stars, 19, &options, &psf), BST_ERR_RANGE);
     assert_non_null(strstr(
         ctx.message, "stars are too few for a PSF at 2 places of the field (allowed: at least"));
+    /* of all but 18 there is only noise: light of 1.6 standard deviations, of which 10 are needed
+     */
+    static float kept[STARS * STAMP * STAMP];
+    memcpy(kept, pixels, sizeof kept);
+    for (int k = 18 * STAMP * STAMP; k < STARS * STAMP * STAMP; k++) {
+        pixels[k] = (float)(100.0 + normal());
+    }
+    assert_int_equal(bst_effective_psf_fit(&ctx, stars, STARS, &options, &psf), BST_ERR_RANGE);
+    assert_non_null(strstr(ctx.message, "stars are too few for a PSF at 2 places"));
+    memcpy(pixels, kept, sizeof kept);
     for (int i = 0; i < STARS; i++) {
         stars[i].field_x *= 0.005;
     }

@@ -218,6 +218,59 @@ static void test_the_text_is_a_scenario(void **state) {
     free(text);
 }
 
+/* Times of modules are shares of a short period and fixed ones of a long one; what waits for frames
+ * waits for as many of a slow camera. */
+static void times_by_the_period(void **state) {
+    (void)state;
+    static const struct {
+        double period_s, image_s, tracks_s, command_s, v_mag;
+        const char *v, *gap, *timeout;
+    } cases[] = {{0.4, 0.12, 0.08, 0.04, 9.3, "\"v_mag\": 9.3", NULL, NULL},
+                 {0.8, 0.15, 0.16, 0.05, (double)INFINITY, "\"v_mag\": 10.0", NULL, NULL},
+                 {1.5, 0.15, 0.2, 0.05, 12.0, "\"v_mag\": 12.0", NULL, NULL},
+                 {2.5, 0.15, 0.2, 0.05, 12.0, "\"v_mag\": 12.0", "\"initiation_gap_s\": 8.75",
+                  "\"dwell_timeout_s\": 50,\n                            "
+                  "\"acquire_timeout_s\": 50,\n                            "
+                  "\"reacquire_coast_s\": 50,"}};
+    bst_ctx ctx = {0};
+    bst_new_request q = {.aperture_m = 0.2, .name = "a", .observer_label = "eye"};
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "o", "39089", &q.observer));
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "t", "44801", &q.target));
+    for (int i = 0; i < 4; i++) {
+        bst_new_scene s = {.duration_s = 90.0,
+                           .period_s = cases[i].period_s,
+                           .exposure_s = 0.3,
+                           .pixel_arcsec = 4.5,
+                           .side_px = 400,
+                           .v_mag = cases[i].v_mag,
+                           .range_m = 4e7,
+                           .rate_arcsec_per_s = 90.0};
+        char *text = NULL, part[96];
+        size_t bytes = 0;
+        FILE *stream = open_memstream(&text, &bytes);
+        bst_new_scenario_write(stream, &q, &s);
+        assert_int_equal(fclose(stream), 0);
+        const char *const names[] = {"\"los_command\": %.4g}", "\"frame\": %.4g}",
+                                     "\"tracks\": %.4g}", "\"command_latency_s\": %.4g,"};
+        const double values[] = {cases[i].command_s, cases[i].image_s, cases[i].tracks_s,
+                                 cases[i].command_s};
+        for (int k = 0; k < 4; k++) {
+            snprintf(part, sizeof part, names[k], values[k]);
+            if (!strstr(text, part)) {
+                fail_msg("period %g: no %s", cases[i].period_s, part);
+            }
+        }
+        assert_non_null(strstr(text, cases[i].v));
+        assert_non_null(strstr(text, "\"telemetry_sigma_arcsec\": 3"));
+        assert_non_null(strstr(text, "\"rate_sigma_arcsec_per_s\": 0.9,"));
+        assert_non_null(strstr(text, "\"offset_deg\": 0.05,")); /* a tenth of 400 x 4.5 arcsec */
+        assert_int_equal(strstr(text, "timeout_s") != NULL, cases[i].timeout != NULL);
+        assert_true(!cases[i].gap || strstr(text, cases[i].gap));
+        assert_true(!cases[i].timeout || strstr(text, cases[i].timeout));
+        free(text);
+    }
+}
+
 /* A judge that keeps the scenes it refuses, best first. */
 typedef struct judged {
     bst_new_scene scenes[12];
@@ -393,6 +446,7 @@ static void test_scenes_are_as_seen(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_plain_names),
+        cmocka_unit_test(times_by_the_period),
         cmocka_unit_test(test_corners_keep_off_the_limb),
         cmocka_unit_test(test_lines_of_sight_clear_the_limb),
         cmocka_unit_test(test_scenes_are_as_seen),

@@ -380,7 +380,7 @@ static void detections_of_stars(void **state) {
     for (int i = 0; i < 4000; i++) {
         bst_detection d = {.x_px = 224 * draw(&seed), .y_px = 160 * draw(&seed)};
         d.flags = i % 4 == 1 ? BST_DETECTION_STREAK : i % 4 == 2 ? BST_DETECTION_EDGE : 0;
-        d.length_px = 70 * draw(&seed);
+        d.length_px = 160 * draw(&seed);
         d.angle_rad = 3 * draw(&seed);
         double reach = 2.5 * (d.flags & BST_DETECTION_EDGE ? 2 : 1);
         bool expected_star = false;

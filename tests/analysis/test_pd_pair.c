@@ -31,7 +31,7 @@ static double streak_px;
 /* Shares of a Gaussian's light in pixels, as sums over points of its path. */
 static double share(double x, double y, double dx, double dy) {
     double sum = 0.0;
-    int n = dx != 0.0 || dy != 0.0 ? 400 : 1;
+    int n = dx != 0.0 || dy != 0.0 ? 60 : 1;
     for (int k = 0; k < n; k++) {
         double t = (k + 0.5) / n - 0.5, u = x - t * dx, v = y - t * dy, s = SIGMA * sqrt(2.0);
         sum += 0.25 * (erf((u + 0.5) / s) - erf((u - 0.5) / s)) *
@@ -40,8 +40,15 @@ static double share(double x, double y, double dx, double dy) {
     return sum;
 }
 
+/* The same for the same streak is not computed again. */
 static double squares(double dx, double dy) {
-    double sum = 0.0;
+    static double of[2] = {-1.0, -1.0}, sum;
+    if (dx == of[0] && dy == of[1]) {
+        return sum;
+    }
+    of[0] = dx;
+    of[1] = dy;
+    sum = 0.0;
     for (int j = -16; j <= 16; j++) {
         for (int i = -16; i <= 16; i++) {
             sum += pow(share(i, j, dx, dy), 2.0);

@@ -383,7 +383,8 @@ def bent_path(length_px, scale_arcsec):
 
 def sensor():
     """A sensor with all that darks and bias frames tell: a slow read-out, hot pixels, traps, radiation."""
-    scene = changed(track(), {**SMALL, SENSOR + "/camera/width_px": 236, SENSOR + "/camera/height_px": 172, SENSOR + "/camera/dark_current_e_per_s": 15})
+    scene = changed(track(), {**SMALL, SENSOR + "/camera/width_px": 236, SENSOR + "/camera/height_px": 172, SENSOR + "/camera/dark_current_e_per_s": 15,
+                              SENSOR + "/exposure/period_s": 1.6})
     scene["observers"][0]["sensors"][0]["camera"]["detector"] = {
         "dsnu_rms": 0.3, "hot_fraction": 0.004, "readout_s": 3, "output": {"right": True, "top": True}, "row_noise_e": 2, "column_offset_rms_e": 4,
         "parallel_traps": {"traps_per_px": [0.05, 0.02, 0]}, "serial_traps": {"traps_per_px": [0.03, 0.02, 0]}, "prnu_rms": 0.012, "dead_fraction": 0.002,
@@ -396,8 +397,9 @@ def starry():
     scene = changed(track(), {**SMALL, "/duration_s": 6, SENSOR + "/camera/aperture_m": 0.3, SENSOR + "/camera/rotation_deg": -37,
                               SENSOR + "/camera/pixel_scale_arcsec": 14, "/world/faint_stars": "statistical", "/world/faint_limit_v_mag": 14,
                               SENSOR + "/knowledge/star_catalogue": "embedded", "/record/compression": "none",
-                              SENSOR + "/camera/distortion": {"k1": -40, "p1": 0.2}})
+                              SENSOR + "/camera/distortion": {"k1": -40, "p1": 0.2}, SENSOR + "/exposure/window_px": [16, 8, 276, 216]})
     scene["name"] = "stars"
+    scene["world"]["objects"][0]["burns"] = [{"time_s": 2.33, "dv_rtn_mps": [0.2, -0.1, 0.3]}]
     return scene
 
 

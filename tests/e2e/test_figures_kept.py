@@ -34,6 +34,7 @@ FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "kept")
 LINES_SHOWN = 40
 # Inputs, durations, states of one version, what gnuplot and its fonts draw, raw bytes
 LEFT_OUT = ("scenario.json", "study.json", "wall_clock.csv", "pointing.png", "plot.png", "link.packets")
+PROGRESS = re.compile(r"\d of \d+ .*, \d+ a second")  # lines of what takes some seconds
 TRIES = 3  # of a run that is to be killed before it ends
 ENDINGS_LEFT_OUT = (".mp4", ".state", ".rows")
 FIGURES = kept_columns.FIGURES
@@ -112,7 +113,7 @@ class Kept:
         if text:
             end = ".json" if result.stdout[:1] in ("{", "[") else ".txt"
             self.columns.put_bytes(f"{name} says", result.stdout.encode(), end)
-        self.columns.put_lines(f"{name} warns", result.stderr)
+        self.columns.put_lines(f"{name} warns", "\n".join(line for line in result.stderr.split("\n") if not PROGRESS.search(line)))
         if os.environ.get("KEPT_SHOW") and result.returncode:
             print(name, result.stderr[:600], result.stdout[-600:], file=sys.stderr)
         for path in adds:
@@ -417,10 +418,12 @@ def scene_measured(k):
         k.call(name, "pd", *words, "--pair", "--snr", "60", "--ratio", "2", "--separation", "1.2,1.9", "--false-splits", "0.01", "--threads", "1",
                "--json", k.path("pd.json"), "--plot", k.path("pd.png"), text=False, adds=[k.path("pd.json")])
         k.add_script(name + " plot", k.path("pd.png"))
-    k.write("study.json", {"boresight_study": 1, "seed": "0x53", "name": "pd", "kind": "pd", "scenarios": [{"file": gaussian}], "replicates": 2,
-                           "resamples": 100, "pd": {"snr_first": 5, "snr_last": 9, "snr_step": 4, "trials": 12, "false_alarms_per_frame": 4, "empty_frames": 5},
-                           "sweeps": [{"axes": [{"path": kept_scenes.SENSOR + "/camera/read_noise_e", "values": [5, 25]},
-                                                {"path": "/pd/streak_px", "values": [0, 6]}]}]})
+    turned = k.write("turned.json", kept_scenes.changed(scene, {"/name": "turned", kept_scenes.SENSOR + "/camera/rotation_deg": 75,
+                                                                kept_scenes.SENSOR + "/camera/aperture_m": 0.2}))
+    k.write("study.json", {"boresight_study": 1, "seed": "0x53", "name": "pd", "kind": "pd", "scenarios": [{"file": gaussian}, {"file": turned}],
+                           "resamples": 100, "pd": {"snr_first": 5, "snr_last": 9, "snr_step": 4, "trials": 12, "false_alarms_per_frame": 4, "empty_frames": 5,
+                                                    "known_rate": True, "min_separation_px": 31, "background_e": 40, "jitter_px": 0.2},
+                           "sweeps": [{"axes": [{"path": "/pd/streak_px", "values": [4, 6]}]}]})
     k.call("study", "study", k.path("study.json"), "--out", k.path("study"), "--quiet", "--workers", "1", text=False)
     for name in sorted(n for n in os.listdir(k.path("study")) if n.endswith(".csv")):
         k.add("study " + name, os.path.join(k.path("study"), name))
@@ -442,17 +445,19 @@ def scene_sensor(k):
     """A sensor and a camera from frames of their own."""
     k.draw_scripts()
     scene = k.write("sensor.json", kept_scenes.sensor())
-    for folder, words in (("cal", ["--bias", "4", "--dark", "5", "--flat", "4"]),
+    for folder, words in (("cal", ["--bias", "4", "--dark", "5", "--flat", "4", "--linearity", "6"]),
                           ("warm", ["--bias", "0", "--dark", "4", "--flat", "0", "--set", kept_scenes.SENSOR + "/camera/dark_current_e_per_s=40"])):
         k.call(folder, "calframes", scene, "--out", k.path(folder), "--exposure", "4", "--threads", "1", *words)
     names = {f"{folder} {n.rsplit('_', 1)[1][:-5]}": os.path.join(k.path(folder), n) for folder in ("cal", "warm") for n in os.listdir(k.path(folder))}
     for name, words in (("darks", ["--dark", names["cal dark"], "--pitch", "9"]),
                         ("bias", ["--bias", names["cal bias"], "--simulated", names["cal bias"]]),
-                        ("all", ["--dark", names["cal dark"], "--bias", names["cal bias"], "--flat", names["cal flat"], "--warm", names["warm dark"],
+                        ("all", ["--dark", names["cal dark"], "--bias", names["cal bias"], "--flat", names["cal flat"], "--linearity", names["cal linearity"], "--warm", names["warm dark"],
                                  "--warmer", "8", "--simulated", names["cal dark"], "--extends", scene])):
         k.call(name, "characterize", "--map", "boresight", *words, "--out", k.path(name), adds=[k.path(name)])
         k.add_script(name + " plot", os.path.join(k.path(name), "plot.png"))
-    k.run("stars", kept_scenes.starry())
+    k.call("loop", "loop", scene, "--plot", k.path("loop.png"), text=False)
+    k.add_script("loop plot", k.path("loop.png"))
+    k.export("oem", k.run("stars", kept_scenes.starry()), "--orbits", "oem", "--step", "0.2")
     k.call("camera", "calibrate-camera", k.path("stars"), "--out", k.path("camera"), "--psf-columns", "1", "--psf-rows", "1", "--psf-radius", "7",
            adds=[k.path("camera")])
     k.call("images and generator", "calibrate-obsgen", "--check", k.path("stars.json"), "--seeds", "2", "--duration", "3", "--json", k.path("check.json"),

@@ -35,7 +35,7 @@ static void make_run(run_tables *t) {
         "INSERT INTO detections VALUES (0, 6, 'star', 80, 50, 0, 9, 700, 0), (0, 6, 'star', 82, "
         "52, "
         "0, 0, 800, 0),"
-        " (0, 6, 'object', 72.5, 40.5, 40, 0, 5, 60), (0, 6, 'object', 90, 60, 0, 0, NULL, 0),"
+        " (0, 6, 'object', 72.5, 40.5, 24, 0, 5, 60), (0, 6, 'object', 90, 60, 0, 0, NULL, 0),"
         " (0, 6, 'object', 72.5, 41.5, 0, 0, 900, 0), (1, 6, 'object', 1, 1, 0, 0, 1e9, 0);"
         "CREATE TABLE tracks (sensor INT, exposure_id INT, track_id INT, status TEXT,"
         " target_of_interest INT, x_px REAL, y_px REAL, snr REAL, misses_in_row INT);"
@@ -84,7 +84,7 @@ static void a_binned_window(void **state) {
         {BST_OVERLAY_OBJECT, 50, 40, 0, "NORAD 44801"},
         {BST_OVERLAY_TRACK, 61, 45, 0, "track 12 SNR 5.5"},
     };
-    static const expected_mark last[] = {{BST_OVERLAY_DETECTION, 72.5, 40.5, 40, ""},
+    static const expected_mark last[] = {{BST_OVERLAY_DETECTION, 72.5, 40.5, 24, ""},
                                          {BST_OVERLAY_DETECTION, 72.5, 41.5, 0, ""},
                                          {BST_OVERLAY_REST, 82, 52, 0, ""},
                                          {BST_OVERLAY_STAR, 80, 50, 0, ""},
@@ -110,10 +110,11 @@ static void a_binned_window(void **state) {
         at += k->kind == BST_OVERLAY_DETECTION;
     }
     assert_int_equal(at, 3);
-    bst_assert_close(o.marks[3].radius_px, 0.5 * 40 / 2 + 2, 1e-12);
-    /* half of the streak, in binned pixels, 60 degrees from x towards y */
-    bst_assert_close(o.marks[3].half_x_px, 0.5 * 40 / 2 * 0.5, 1e-12);
-    bst_assert_close(o.marks[3].half_y_px, 0.5 * 40 / 2 * sqrt(0.75), 1e-12);
+    bst_assert_close(o.marks[3].radius_px, 0.5 * 24 / 2 + 2, 1e-12);
+    /* half of the streak, in binned pixels, 60 degrees from x towards y; 16 px of the sensor make
+     * one */
+    bst_assert_close(o.marks[3].half_x_px, 0.5 * 24 / 2 * 0.5, 1e-12);
+    bst_assert_close(o.marks[3].half_y_px, 0.5 * 24 / 2 * sqrt(0.75), 1e-12);
     bst_assert_close(o.marks[10].radius_px, 2, 1e-12);
     bst_assert_ok(&ctx, bst_frame_marks_get(&ctx, m, 8, &o));
     assert_string_equal(o.caption, "frame 8   2022-06-16T22:10:03.500Z   1.000 s   mode: track");

@@ -21,7 +21,7 @@ import shutil
 import sys
 import tempfile
 
-from every_function import FUNCTION, Function, Library, asks_for, passes
+from every_function import FUNCTION, Function, Library, passes
 from mutate import blank_comments, wilson
 from quick_tree import QuickTree
 
@@ -110,8 +110,10 @@ class Listed(Library):
         place = super().write(path)
         with open(place, encoding="utf-8") as file:
             text = file.read()
+        text = text[text.index("#endif\n") + len("#endif\n"):]
+        first = re.search(r"^#include", text, re.M).start()  # after what the file defines for its headers
         with open(place, "w", encoding="utf-8") as file:
-            file.write(asks_for(text) + CHOICE + text[text.index("#endif\n") + len("#endif\n"):])
+            file.write(text[:first] + CHOICE + text[first:])
         return place
 
 

@@ -64,6 +64,25 @@ static void defects_are_found_and_streaks_are_none(void **state) {
     free(t.defects);
 }
 
+/* Half of what a point in the middle of a pixel leaves in its eight neighbours, as the integral of
+ * a Gaussian by the midpoint rule. */
+static void neighbours_of_a_point(void **state) {
+    (void)state;
+    enum { N = 200 };
+    for (int k = 0; k < 4; k++) {
+        double sigma = 0.4 + 0.3 * k, strip[2] = {0.0, 0.0};
+        for (int i = 0; i < N; i++) {
+            double u = (i + 0.5) / N - 0.5;
+            strip[0] += exp(-0.5 * u * u / (sigma * sigma));
+            strip[1] += exp(-0.5 * (u + 1.0) * (u + 1.0) / (sigma * sigma));
+        }
+        double side = strip[1] / strip[0], corner = side * side;
+        const bst_twin_psf psf = {.sigma_px = sigma, .ratio = 2.0, .wide = 0.2};
+        bst_assert_close(bst_twin_defect_neighbours(&psf), 0.5 * (4.0 * side + 4.0 * corner) / 8.0,
+                         1e-4);
+    }
+}
+
 static void error_of_the_psf_is_no_defect(void **state) {
     (void)state;
     static float data[BST_TEST_PIXELS], variance[BST_TEST_PIXELS];
@@ -136,6 +155,7 @@ static void sharpness_follows_the_psf(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(defects_are_found_and_streaks_are_none),
+                                       cmocka_unit_test(neighbours_of_a_point),
                                        cmocka_unit_test(error_of_the_psf_is_no_defect),
                                        cmocka_unit_test(fit_is_the_one_without_these_pixels),
                                        cmocka_unit_test(sharpness_follows_the_psf)};

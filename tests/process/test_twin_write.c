@@ -80,6 +80,22 @@ static double number(const cJSON *item) {
     return cJSON_IsNumber(item) ? item->valuedouble : strtod(item->valuestring, NULL);
 }
 
+/* Attitudes of a path with so many values of its angles across and of its roll. */
+static int attitudes_of(bst_twin *t, int across, int roll) {
+    bst_ctx ctx = {0};
+    bst_twin_camera c;
+    const bst_twin_path before = t->model.path;
+    t->model.path.count[0] = across;
+    t->model.path.count[1] = roll;
+    bst_assert_ok(&ctx, bst_twin_write(&ctx, t, &c));
+    t->model.path = before;
+    int count = cJSON_GetArraySize(member(member(written.path, "frames")->child, "pointing"));
+    cJSON_Delete(written.scenario);
+    cJSON_Delete(written.path);
+    free(written.psf);
+    return count;
+}
+
 static void files_of_the_fit(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -106,6 +122,10 @@ static void files_of_the_fit(void **state) {
     t.defects = &defect;
     t.defect_count = 1;
     bst_twin_camera c;
+    /* a camera at rest, and one that only rolls or only turns */
+    assert_int_equal(attitudes_of(&t, 1, 1), 2);
+    assert_int_equal(attitudes_of(&t, 1, 3), 257);
+    assert_int_equal(attitudes_of(&t, 3, 1), 257);
     bst_assert_ok(&ctx, bst_twin_write(&ctx, &t, &c));
     assert_true(written.stars);
 
