@@ -28,7 +28,7 @@ from astropy.io import fits
 import kept_columns
 import kept_scenes
 import runs
-from kept_views import scene_shown
+from kept_views import scene_reported, scene_shown
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "kept")
 LINES_SHOWN = 40
@@ -372,7 +372,7 @@ def scene_orbits(k):
 SCENES = {name[len("scene_"):]: function for name, function in sorted(globals().items()) if name.startswith("scene_")}
 # quick ones and those that are odd in the most ways first
 ORDER = ["unlike", "restored", "orbits", "unlike_derived", "charge", "tasking", "oem", "rolling", "wide", "visible", "infrared", "passing", "studies",
-         "linked", "shown", "files", "lost", "search", "rate", "recorded"]
+         "linked", "shown", "reported", "files", "lost", "search", "rate", "recorded"]
 
 
 def kept_path(name):
