@@ -329,18 +329,29 @@ static void scale_and_own_window(void **state) {
     bst_assert_close(l.items[2].pixel_scale_arcsec, 0, 0);
 }
 
-/* Saves at a tick and goes on with another "exposure" block. */
-static void run_changed(const char *before, const char *after, const char *module_block,
-                        int64_t save_tick, int64_t until_tick, train *out) {
+/* When a run is saved, once or (0: not) once more, and until when it goes on. */
+typedef struct span {
+    int64_t save_tick, again_tick, until_tick;
+} span;
+
+/* Saves at a tick and goes on with another "exposure" block; saves once more and goes on. */
+static void run_changed(const char *before, const char *after, const char *module_block, span t,
+                        train *out) {
     bst_ctx ctx = {0};
-    saving save = {.tick = save_tick}, from;
+    saving save[2] = {{.tick = t.save_tick}, {.tick = t.again_tick}}, from[2];
     size_t size;
-    bst_assert_ok(&ctx, bst_archive_create(&ctx, &save.archive));
-    bst_assert_ok(&ctx, try_part(&ctx, "", before, module_block, "", 0, &save, NULL, out));
-    const void *bytes = bst_archive_data(save.archive, &size);
-    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &from.archive));
-    bst_assert_ok(&ctx, try_part(&ctx, "", after, module_block, "", until_tick, NULL, &from, out));
-    bst_archive_free(from.archive), bst_archive_free(save.archive);
+    for (int k = 0; k < (t.again_tick ? 2 : 1); k++) {
+        bst_assert_ok(&ctx, bst_archive_create(&ctx, &save[k].archive));
+        bst_assert_ok(&ctx, try_part(&ctx, "", k ? after : before, module_block, "", 0, &save[k],
+                                     k ? &from[0] : NULL, out));
+        const void *bytes = bst_archive_data(save[k].archive, &size);
+        bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &from[k].archive));
+    }
+    bst_assert_ok(&ctx, try_part(&ctx, "", after, module_block, "", t.until_tick, NULL,
+                                 &from[t.again_tick ? 1 : 0], out));
+    for (int k = 0; k < (t.again_tick ? 2 : 1); k++) {
+        bst_archive_free(from[k].archive), bst_archive_free(save[k].archive);
+    }
 }
 
 /* What the scenario has changed while a run was saved holds from the next exposure on, each setting
@@ -360,9 +371,12 @@ static void changes_hold_from_the_next_exposure_on(void **state) {
                 {BLOCK("0.5", "1.5", "3", "16"), 3000, 9000, 3, 16},
                 {BLOCK("0.5", "1", "4", "16"), 3000, 6000, 4, 16}};
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
-        for (int open = 0; open < 2; open++) {
+        for (int n = 0; n < 4; n++) { /* saved once, or once more before they hold */
             train l;
-            run_changed(rows[0].after, rows[k].after, "", open ? 7000 : 10000, 50000, &l);
+            const bool open = n % 2;
+            const int64_t tick = open ? 7000 : 10000;
+            run_changed(rows[0].after, rows[k].after, "", (span){tick, n / 2 * (tick + 900), 50000},
+                        &l);
             assert_true(l.count >= 4);
             for (int i = 0; i < 4; i++) {
                 const bst_exposure *e = &l.items[i];
@@ -392,7 +406,7 @@ static void commands_outlast_saved_states(void **state) {
                     "\"control\": {\"type\": \"commander\", \"at_tick\": 1000, \"exposure_s\": "
                     "0.25, \"period_s\": 2, \"binning\": 2, \"x0\": 300, \"y0\": 200, "
                     "\"width\": 50, \"height\": 60, \"pixel_scale_arcsec\": 1.5}",
-                    k < 2 ? 7000 : 10000, 40000, &l);
+                    (span){k < 2 ? 7000 : 10000, 0, 40000}, &l);
         assert_int_equal(l.count, k < 2 ? 3 : 2);
         for (int i = 0; i < l.count; i++) {
             const bst_exposure *e = &l.items[i];
