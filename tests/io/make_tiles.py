@@ -11,6 +11,7 @@ import numpy as np
 from astropy.io import fits
 
 WIDTH, HEIGHT, PLANES = 53, 37, 5
+WITHOUT_WIDTH = 7  # doubles as whole numbers whose header does not say of how many bytes: 4
 
 
 def pixels(planes=1):
@@ -30,7 +31,8 @@ def cases():
     image = pixels()
     odd = image.copy()
     odd[5, 7] = np.nan
-    odd[16:24, 17:34] *= 1e12  # tiles that whole numbers do not hold
+    odd[16:24, 17:34] *= 1e12
+    odd[30, 40] = 3e13  # a tile that whole numbers of its noise do not hold: it is kept as it is
     for kind, method, dither in ((np.float32, "RICE_1", -1), (np.float32, "RICE_1", 1), (np.float64, "RICE_1", 2), (np.float32, "GZIP_2", 1)):
         yield image.astype(kind), of(method, quantize_method=dither, quantize_level=16, dither_seed=77)
     yield odd.astype(np.float32), of("RICE_1", quantize_method=1, quantize_level=16, dither_seed=9990)
@@ -42,12 +44,22 @@ def cases():
     yield cube.astype(np.float32), of("RICE_1", (20, 9, 3), quantize_level=16)
 
 
+def rename(path, old, new):
+    with open(path, "rb") as file:
+        data = file.read()
+    assert old in data
+    with open(path, "wb") as file:
+        file.write(data.replace(old, new))
+
+
 def main():
     warnings.simplefilter("ignore")
     count = 0
     for image, options in cases():
         path = os.path.join(sys.argv[1], f"{count}.fits")
         fits.HDUList([fits.PrimaryHDU(), fits.CompImageHDU(image, **options)]).writeto(path)
+        if count == WITHOUT_WIDTH:
+            rename(path, b"BYTEPIX", b"UNKNOWN")
         with fits.open(path) as file:
             back = np.array(file[1].data, np.float32)
         back[np.isnan(image)] = np.nan  # astropy 5 reads the number that stands for none
