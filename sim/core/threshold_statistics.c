@@ -55,7 +55,7 @@ double bst_threshold_quantile(double u, const bst_threshold_weights *weights,
         scale /= noise->noise_e;
         cumulant[i] = scale * weights->power[i];
     }
-    /* cumulants of uniform quantisation: -B_n / n step^n with Bernoulli numbers */
+    /* cumulants of uniform quantisation: B_n / n step^n with Bernoulli numbers */
     double square = step * step;
     cumulant[1] -= square * square / 120.0 * weights->power[1];
     cumulant[3] += square * square * square / 252.0 * weights->power[3];

@@ -138,7 +138,6 @@ static bst_status check_data(bst_ctx *ctx, const bst_fits_source *s, int number,
 /* Lists the frames of all HDUs. */
 static bst_status list_frames(bst_ctx *ctx, bst_fits_source *s) {
     uint64_t at = 0;
-    int images = 0;
     for (int number = 1; at < s->bytes; number++) {
         bst_fits_source_header *h = number == 1 ? &s->primary : &s->header;
         char begins[8] = "";
@@ -154,7 +153,6 @@ static bst_status list_frames(bst_ctx *ctx, bst_fits_source *s) {
         hdu.end = hdu.data_at +
                   (h->cards.data_bytes + BST_FITS_BLOCK - 1) / BST_FITS_BLOCK * BST_FITS_BLOCK;
         if (hdu.size[0] > 0) {
-            hdu.image = number > 1 ? images++ : -1;
             BST_TRY(add(ctx, s, &hdu));
         }
         at = hdu.end;

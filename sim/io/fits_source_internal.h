@@ -17,7 +17,6 @@ typedef struct bst_fits_source_hdu {
     int number; /* from 1 */
     int bitpix;
     int64_t first; /* number of its first frame in the file */
-    int64_t image; /* number among the extensions with an image; -1: the primary array */
     uint64_t at, data_at, end;
     int64_t size[3]; /* width, height, planes */
     bool planes, compressed, has_blank;

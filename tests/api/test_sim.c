@@ -267,9 +267,15 @@ static void states_of_objects(void **state) {
                   bst_sim_command_state(&ctx, other, "INMARSAT GX5", 1.0, position, velocity));
     assert_int_equal(bst_sim_command_state(&ctx, sim, "NONE", 1.0, position, velocity),
                      BST_ERR_NOT_FOUND);
-    const bst_vec3 wrong = {(double)NAN, 0.0, 0.0};
-    assert_int_equal(bst_sim_command_state(&ctx, sim, "INMARSAT GX5", 2.0, wrong, velocity),
-                     BST_ERR_ARGUMENT);
+    for (int k = 0; k < 7; k++) { /* each of the numbers must be finite */
+        double v[7] = {2.0 + k, 4.2e7, 1e5, 2e5, 0.0, 3074.0, 0.0};
+        v[k] = k % 2 ? (double)INFINITY : (double)NAN;
+        assert_int_equal(
+            bst_sim_command_state(&ctx, sim, "INMARSAT GX5", v[0], (bst_vec3){v[1], v[2], v[3]},
+                                  (bst_vec3){v[4], v[5], v[6]}),
+            BST_ERR_ARGUMENT);
+        assert_non_null(strstr(ctx.message, "is not finite"));
+    }
     bst_sim_free(sim);
     bst_sim_free(other);
     bst_model_free(model);
@@ -293,6 +299,15 @@ static void attitudes_of_objects(void **state) {
     bst_assert_ok(&ctx, bst_sim_command_attitude(&ctx, other, "INMARSAT GX5", 0.5, q, rate));
     assert_int_equal(bst_sim_command_attitude(&ctx, sim, "INMARSAT GX5", 2.0, wrong, rate),
                      BST_ERR_ARGUMENT);
+    for (int k = 0; k < 8; k++) {
+        double v[8] = {2.0 + k, 0.0, 0.6, 0.0, 0.8, 0.0, 0.1, 0.0};
+        v[k] = k % 2 ? -(double)INFINITY : (double)NAN;
+        assert_int_equal(bst_sim_command_attitude(&ctx, sim, "INMARSAT GX5", v[0],
+                                                  (bst_quat){v[1], v[2], v[3], v[4]},
+                                                  (bst_vec3){v[5], v[6], v[7]}),
+                         BST_ERR_ARGUMENT);
+        assert_non_null(strstr(ctx.message, "is not finite"));
+    }
     assert_int_equal(bst_sim_command_attitude(&ctx, sim, "NONE", 2.0, q, rate), BST_ERR_NOT_FOUND);
     bst_assert_ok(&ctx, bst_sim_command_attitude(&ctx, sim, "INMARSAT GX5", 9.0, q, rate));
     void *saved;

@@ -118,6 +118,15 @@ static void test_refused_texts(void **state) {
         {"{\"a\": \"\\ud800\\u0041\"}",
          "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
          "character beyond U+FFFF takes two such, a high and a low surrogate)"},
+        {"{\"a\": \"\\udbff\\udbff\"}",
+         "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
+         "character beyond U+FFFF takes two such, a high and a low surrogate)"},
+        {"{\"a\": \"\\ud800\\ue000\"}",
+         "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
+         "character beyond U+FFFF takes two such, a high and a low surrogate)"},
+        {"{\"a\": \"\\udfff\"}",
+         "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
+         "character beyond U+FFFF takes two such, a high and a low surrogate)"},
         {"{\"a\": \"\\u12\"}",
          "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
          "character beyond U+FFFF takes two such, a high and a low surrogate)"},
@@ -168,6 +177,7 @@ static void test_accepted_texts(void **state) {
         "[0, -0, 0.5, -1.25e-3, 1E+5, 10]",
         "\"gr\xC3\xBC\xC3\x9F \\u00e9 \\ud83d\\ude80 \\\\u0000 \xF0\x9F\x9A\x80\"",
         "{\"a\": \"[[[[{{{{ 01 1. - \\\" \"}",
+        "[\"\\ud800\\udc00 \\ud800\\udfff \\udbff\\udc00 \\udbff\\udfff \\ud7ff \\ue000\"]",
     };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         bst_ctx ctx = {0};

@@ -116,7 +116,7 @@ static double counts_and_normal(double v, const double *about) {
 static void quantile_of_steps(void **state) {
     (void)state;
     const bst_threshold_weights one = equal_weights(1);
-    const double steps[] = {0.6, 0.9, 1.2}, within[] = {2e-4, 2e-3, 1.2e-2}; /* eighth cumulant */
+    const double steps[] = {0.6, 0.9, 1.2}, within[] = {3e-5, 3e-4, 2e-3}; /* eighth cumulant */
     for (int i = 0; i < 3; i++) {
         const double about[2] = {sqrt(1.0 - steps[i] * steps[i] / 12.0), steps[i]};
         const bst_threshold_noise noise = {.noise_e = 7.0, .step_e = 7.0 * steps[i]};

@@ -76,6 +76,12 @@ static void look_survives_parallel_vectors(void **state) {
     }
     bst_quat q = bst_quat_look((bst_vec3){0, 0, 2}, (bst_vec3){1, 0, 1});
     assert_vec(bst_quat_rotate(q, (bst_vec3){1, 0, 0}), (bst_vec3){1, 0, 0}, 1e-15 * 4);
+    /* a hint that is nearly parallel still says where x is */
+    for (double beside = 0.1; beside > 1e-7; beside *= 0.01) {
+        q = bst_quat_look((bst_vec3){0, 0, 3}, (bst_vec3){-0.6 * beside, 0.8 * beside, -2});
+        assert_vec(bst_quat_rotate(q, (bst_vec3){-0.6, 0.8, 0}), (bst_vec3){1, 0, 0},
+                   1e-15 / beside + 1e-15 * 4);
+    }
 }
 
 static void angle_is_accurate_at_both_ends(void **state) {

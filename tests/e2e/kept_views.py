@@ -7,6 +7,8 @@ import sqlite3
 import urllib.error
 import urllib.request
 
+import numpy as np
+
 import kept_scenes
 
 PANELS = ("pointing_error", "snr", "track_error", "innovation", "mount", "third_axis", "limits", "body_rate", "detections", "attitude_error",
@@ -111,3 +113,67 @@ def stretched(k, out):
     k.call("slow report", "report", folder, "--out", k.path("slow.html"), adds=[k.path("slow.html")])
     k.view("slow", folder, *(f"api/plot?sensor={s}&panel={p}&from=431&to=3025&columns=40" for s in (0, 2) for p in PANELS),
            "api/modes?sensor=2", "api/frame?sensor=2&frame=60", "api/track?sensor=2&object=1&frame=63", "api/why?sensor=2&frame=50")
+
+
+def study_tables(k, name, axes, settings, metrics, seed, kind="loop", curves=False):
+    """A folder with the tables of a study: axes [(name, role, design)], settings [values of the swept axes]."""
+    folder = k.path(name)
+    os.mkdir(folder)
+    rng = np.random.default_rng(seed)
+    db = sqlite3.connect(os.path.join(folder, "study.sqlite"))
+    swept = [a[0] for a in axes if a[1] == "sweep"]
+    names = [a[0] for a in axes] + metrics
+    db.executescript(
+        "CREATE TABLE about (key, value); CREATE TABLE axes (axis, name, path, role, design); CREATE TABLE scenarios (scenario, name);"
+        "CREATE TABLE metrics (metric, unit, doc, kind); CREATE TABLE columns (tab, name, unit);"
+        "CREATE TABLE statistics (setting, metric, runs, missing, mean, low, high, std, minimum, median, p95, maximum);"
+        f"CREATE TABLE settings (setting, {', '.join(swept)}); CREATE TABLE speed (run, wall_s, cpu_s);"
+        f"CREATE TABLE runs (run, setting, status, error, {', '.join(names)});"
+        + "".join(f"CREATE TABLE {t} (sweep, rank, design, metric, axis, effect, effect_error, spread, effects);" for t in ("sensitivity", "speed_sensitivity")))
+    db.executemany("INSERT INTO about VALUES (?, ?)", {"name": name, "kind": kind, "seed": "0x5", "version": "1", "digest": "d", "runs": str(2 * len(settings) + 1),
+                                                       "replicates": "2"}.items())
+    db.executemany("INSERT INTO axes VALUES (?, ?, ?, ?, ?)", [(i, n, "/a/" + n, role, design) for i, (n, role, design) in enumerate(axes)])
+    db.execute("INSERT INTO scenarios VALUES (0, 'base')")
+    db.executemany("INSERT INTO metrics VALUES (?, 'px', ?, ?)", [(m, f"What {m} is.", "rate" if m == "acquired" else "mean") for m in metrics])
+    for s, values in enumerate(settings):
+        db.execute(f"INSERT INTO settings VALUES ({', '.join('?' * (1 + len(swept)))})", (s, *values))
+        for r in range(2):
+            drawn = [dict(zip(swept, values)).get(a[0], rng.uniform(-3, 9)) for a in axes]
+            results = [None if (s + r) % 11 == 7 and m == metrics[-1] else float(rng.gamma(2 + i) + 0.2 * s) for i, m in enumerate(metrics)]
+            bad = s == 3 and r == 1
+            db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * (4 + len(names)))})", (2 * s + r, s, "failed" if bad else "done", "no light" if bad else "", *drawn, *results))
+            if (s, r) != (1, 0):
+                db.execute("INSERT INTO speed VALUES (?, ?, ?)", (2 * s + r, 3 + rng.uniform(), 8 + rng.uniform()))
+        for i, m in enumerate(metrics):
+            mean = None if s == 2 and i == 1 else 2.0 + i + 0.3 * s + rng.uniform()
+            db.execute("INSERT INTO statistics VALUES (?, ?, 2, 0, ?, ?, ?, 1, 2, 3, 4, 5)", (s, m, mean, mean and mean - 0.4 - rng.uniform(), mean and mean + 0.9))
+    for i, m in enumerate(metrics):
+        db.execute("INSERT INTO statistics VALUES (NULL, ?, 9, 1, ?, ?, ?, 1, 2, 3, 4, 5)", (m, 3.5 + i, 3.1 + i, 4.4 + i))
+    for table, listed in (("sensitivity", metrics), ("speed_sensitivity", ["wall_s", "cpu_s"])):
+        for m in listed:
+            for rank, a in enumerate(a for a in axes if a[2] in ("morris", "one_at_a_time")):
+                db.execute(f"INSERT INTO {table} VALUES (0, ?, ?, ?, ?, ?, ?, ?, 12)", (rank + 1, a[2], m, a[0], 5.0 / (rank + 1.3), None if rank == 1 else 0.4, 0.7 + 0.2 * rank))
+    if curves:
+        db.executemany("INSERT INTO columns VALUES ('pd_statistics', ?, ?)", [("setting", ""), ("runs", ""), ("snr", ""), ("v_mag", "mag"), ("rate", ""), ("rate_low", ""),
+                                                                               ("rate_high", ""), ("ideal_pd", "")])
+        db.execute("CREATE TABLE pd_statistics (setting, runs, snr, v_mag, rate, rate_low, rate_high, ideal_pd)")
+        for s in range(len(settings)):
+            for snr in range(3, 9):
+                rate = 1 / (1 + np.exp(6 - snr - 0.3 * s))
+                db.execute("INSERT INTO pd_statistics VALUES (?, 2, ?, ?, ?, ?, ?, ?)", (s, snr, 17.3 - 0.8 * snr, rate, 0.9 * rate, rate + 0.1 * (1 - rate), min(1, 1.1 * rate)))
+    db.commit()
+    db.close()
+    k.call(f"{name} report", "report", folder, "--out", k.path(name + ".html"), adds=[k.path(name + ".html")])
+    k.view(name, folder, "api/study")
+
+
+def scene_reported(k):
+    """Reports of studies of every design, from tables of numbers that mean nothing."""
+    metrics = ["pointing_rms_px", "custody", "acquired", "loss_db_pd50"]
+    study_tables(k, "grid", [("gain", "sweep", "grid"), ("noise", "sweep", "grid"), ("filter", "sweep", "grid"), ("drawn", "dispersion", "")],
+                 [(g, n, f) for g in (1, 3, 9, 30) for n in (4, 5) for f in ("red", "blue")], metrics, 1, curves=True)
+    study_tables(k, "hypercube", [("wide", "sweep", "latin_hypercube"), ("narrow", "sweep", "latin_hypercube"), ("orbit", "population", "")],
+                 [(0.5 * 1.08**i, 7 + (i * 29 % 70) / 9) for i in range(70)], metrics, 2)
+    study_tables(k, "morris", [(f"axis_{i}", "sweep", "morris") for i in range(4)], [tuple(1 + (i >> b & 1) for b in range(4)) for i in range(12)], metrics, 3)
+    study_tables(k, "one", [(f"axis_{i}", "sweep", "one_at_a_time") for i in range(3)],
+                 [(2, 30, 0.1), (1, 30, 0.1), (5, 30, 0.1), (2, 10, 0.1), (2, 90, 0.1), (2, 30, 0.7)], metrics, 4)

@@ -28,7 +28,7 @@ from astropy.io import fits
 import kept_columns
 import kept_scenes
 import runs
-from kept_views import scene_shown
+from kept_views import scene_reported, scene_shown
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "kept")
 LINES_SHOWN = 40
@@ -467,7 +467,8 @@ def scene_sensor(k):
 SCENES = {name[len("scene_"):]: function for name, function in sorted(globals().items()) if name.startswith("scene_")}
 # quick ones and those that are odd in the most ways first
 ORDER = ["unlike", "restored", "orbits", "checks", "unlike_derived", "charge", "tasking", "oem", "rolling", "wide", "visible", "infrared", "passing",
-         "studies", "crowded", "streaked", "measured", "sensor", "twin", "linked", "shown", "files", "lost", "search", "rate", "recorded"]
+         "studies", "crowded", "streaked", "measured", "sensor", "twin", "linked", "shown",
+         "reported", "files", "lost", "search", "rate", "recorded"]
 
 
 def kept_path(name):

@@ -26,11 +26,7 @@ static const bst_config_desc commander_table[] = {
 
 static bst_status commander_create(const bst_module_env *env, const void *config, void **self) {
     (void)env;
-    union {
-        const void *in;
-        void *out;
-    } keep = {config}; /* read only */
-    *self = keep.out;
+    *self = (void *)(uintptr_t)config; /* read only */
     return BST_OK;
 }
 
@@ -113,8 +109,7 @@ static bst_status try_part(bst_ctx *ctx, const char *camera, const char *exposur
         "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089},"
         "\"sensors\": [{\"name\": \"cam\", \"camera\": {\"width_px\": 640, \"height_px\": 480,"
         "\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15%s}, \"exposure\": {%s}, \"modules\": "
-        "{%s}}]"
-        "}]}";
+        "{%s}}]}]}";
     char text[2000];
     snprintf(text, sizeof text, format, extra, camera, exposure, module_block);
     bst_json *json = NULL;
@@ -329,18 +324,24 @@ static void scale_and_own_window(void **state) {
     bst_assert_close(l.items[2].pixel_scale_arcsec, 0, 0);
 }
 
-/* Saves at a tick and goes on with another "exposure" block. */
+/* Saves at ticks[0], goes on with another "exposure" block, saves at ticks[1] (0: not), goes on. */
 static void run_changed(const char *before, const char *after, const char *module_block,
-                        int64_t save_tick, int64_t until_tick, train *out) {
+                        const int64_t ticks[3], train *out) {
     bst_ctx ctx = {0};
-    saving save = {.tick = save_tick}, from;
-    size_t size;
-    bst_assert_ok(&ctx, bst_archive_create(&ctx, &save.archive));
-    bst_assert_ok(&ctx, try_part(&ctx, "", before, module_block, "", 0, &save, NULL, out));
-    const void *bytes = bst_archive_data(save.archive, &size);
-    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &from.archive));
-    bst_assert_ok(&ctx, try_part(&ctx, "", after, module_block, "", until_tick, NULL, &from, out));
-    bst_archive_free(from.archive), bst_archive_free(save.archive);
+    saving save[2], from[2], *start = NULL;
+    int n = 0;
+    for (size_t size; n < (ticks[1] ? 2 : 1); start = &from[n++]) {
+        save[n].tick = ticks[n];
+        bst_assert_ok(&ctx, bst_archive_create(&ctx, &save[n].archive));
+        bst_assert_ok(&ctx, try_part(&ctx, "", n ? after : before, module_block, "", 0, &save[n],
+                                     start, out));
+        const void *bytes = bst_archive_data(save[n].archive, &size);
+        bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &from[n].archive));
+    }
+    bst_assert_ok(&ctx, try_part(&ctx, "", after, module_block, "", ticks[2], NULL, start, out));
+    while (n-- > 0) {
+        bst_archive_free(from[n].archive), bst_archive_free(save[n].archive);
+    }
 }
 
 /* What the scenario has changed while a run was saved holds from the next exposure on, each setting
@@ -360,9 +361,11 @@ static void changes_hold_from_the_next_exposure_on(void **state) {
                 {BLOCK("0.5", "1.5", "3", "16"), 3000, 9000, 3, 16},
                 {BLOCK("0.5", "1", "4", "16"), 3000, 6000, 4, 16}};
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
-        for (int open = 0; open < 2; open++) {
+        for (int n = 0; n < 4; n++) { /* saved once, or once more before they hold */
             train l;
-            run_changed(rows[0].after, rows[k].after, "", open ? 7000 : 10000, 50000, &l);
+            const int64_t open = n % 2, tick = open ? 7000 : 10000;
+            const int64_t ticks[] = {tick, n / 2 * (tick + 900), 50000};
+            run_changed(rows[0].after, rows[k].after, "", ticks, &l);
             assert_true(l.count >= 4);
             for (int i = 0; i < 4; i++) {
                 const bst_exposure *e = &l.items[i];
@@ -392,7 +395,7 @@ static void commands_outlast_saved_states(void **state) {
                     "\"control\": {\"type\": \"commander\", \"at_tick\": 1000, \"exposure_s\": "
                     "0.25, \"period_s\": 2, \"binning\": 2, \"x0\": 300, \"y0\": 200, "
                     "\"width\": 50, \"height\": 60, \"pixel_scale_arcsec\": 1.5}",
-                    k < 2 ? 7000 : 10000, 40000, &l);
+                    (const int64_t[]){k < 2 ? 7000 : 10000, 0, 40000}, &l);
         assert_int_equal(l.count, k < 2 ? 3 : 2);
         for (int i = 0; i < l.count; i++) {
             const bst_exposure *e = &l.items[i];
@@ -432,8 +435,7 @@ static void a_file_drives_the_frames(void **state) {
         path, keys, sizeof keys);
     run(keys,
         "\"control\": {\"type\": \"commander\", \"exposure_s\": 0.1, \"period_s\": 0.2, "
-        "\"binning\": "
-        "5}",
+        "\"binning\": 5}",
         "", 60001, &l);
     /* starts at 2, 3, 4, 5 s, then as long as the exposure */
     static const int64_t starts[] = {12000, 18000, 24000, 30000, 42000};
@@ -581,20 +583,18 @@ static void dropped_frames_come_in_bursts(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exposures_start_and_end_at_exact_ticks),
-        cmocka_unit_test(the_last_frame_ends_before_the_run),
-        cmocka_unit_test(commands_are_latched_at_the_start),
-        cmocka_unit_test(odd_commands_do_no_harm),
-        cmocka_unit_test(rolling_shutters_take_their_time),
-        cmocka_unit_test(scale_and_own_window),
-        cmocka_unit_test(changes_hold_from_the_next_exposure_on),
-        cmocka_unit_test(commands_outlast_saved_states),
-        cmocka_unit_test(a_file_drives_the_frames),
-        cmocka_unit_test(ramps_are_not_binned),
-        cmocka_unit_test(settings_that_do_not_fit),
-        cmocka_unit_test(dropped_frames_follow_the_seed),
-        cmocka_unit_test(dropped_frames_come_in_bursts),
-    };
+    const struct CMUnitTest tests[] = {cmocka_unit_test(exposures_start_and_end_at_exact_ticks),
+                                       cmocka_unit_test(the_last_frame_ends_before_the_run),
+                                       cmocka_unit_test(commands_are_latched_at_the_start),
+                                       cmocka_unit_test(odd_commands_do_no_harm),
+                                       cmocka_unit_test(rolling_shutters_take_their_time),
+                                       cmocka_unit_test(scale_and_own_window),
+                                       cmocka_unit_test(changes_hold_from_the_next_exposure_on),
+                                       cmocka_unit_test(commands_outlast_saved_states),
+                                       cmocka_unit_test(a_file_drives_the_frames),
+                                       cmocka_unit_test(ramps_are_not_binned),
+                                       cmocka_unit_test(settings_that_do_not_fit),
+                                       cmocka_unit_test(dropped_frames_follow_the_seed),
+                                       cmocka_unit_test(dropped_frames_come_in_bursts)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

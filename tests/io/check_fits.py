@@ -27,6 +27,9 @@ def start_of(frame):
     return Time("2022-06-16T23:59:58.25", scale="utc") + frame * u.s
 
 
+FRACTIONS = ("EARTHFRC", "MOONFRC", "SUNFRC")
+
+
 def check_time(text, expected, what):
     """ISO text against astropy's own clock: written to 1 us."""
     off = abs((Time(text, format="isot", scale="utc") - expected).sec)
@@ -48,7 +51,10 @@ def check_image_header(h, frame, places):
     assert h["OFFSET"] == 100.0 and h["BITS"] == 14
     assert h["SATURATE"] == 2**14 - 1  # the converter ends before 80000 / 1.5 + 100
     assert h["OBJECT"] == "O'Target" and h["INSTRUME"] == "telescope" and h["OBSERVER"] == "neossat"
-    assert h["OBSPOSX"] == 7.0e6 + frame and h["OBSVELZ"] == -120.5
+    assert [h["OBSPOS" + axis] for axis in "XYZ"] == [7.0e6 + frame, -1.0e5, 2.5e5]
+    assert [h["OBSVEL" + axis] for axis in "XYZ"] == [10.0, 7400.0, -120.5]
+    assert [h[key] for key in FRACTIONS] == [0.25, 0.125, 0.0625]
+    assert h["PIXSCALE"] == 50.0 and (h["WINX0"], h["WINY0"], h["BINNING"]) == (0, 0, 1)
     assert 0.0 < h["WCSRESID"] < 1e-3
     begin = start_of(frame)
     for key, offset in (("OBS", 0.0), ("BEG", 0.0), ("AVG", 0.25), ("END", 0.5)):
@@ -74,9 +80,30 @@ def check_extensions(path, places):
         part = f["FRAME", FRAMES + 1]
         assert (part.data == pixels(FRAMES, 20, 10)).all()
         assert part.header["BINNING"] == 2 and part.header["SATURATE"] == 255
+        assert (part.header["WINX0"], part.header["WINY0"]) == (10, 4)
+        check_camera(f[0].header)
         assert part.header["PIXSCALE"] == 100.0
         # full-sensor boresight 30 (0-based) in a window from 10, two pixels a bin: 9.75 -> FITS 10.75
         assert part.header["CRPIX1"] == 10.75 and part.header["CRPIX2"] == (18 - 4 + 0.5) / 2 + 0.5
+
+
+def check_camera(h):
+    assert h["APTDIA"] == 0.15 and h["DARKCUR"] == 0.3 and h["PIXSCALE"] == 50.0
+    assert h["GAIN"] == 1.5 and h["RDNOISE"] == 8.0 and h["OFFSET"] == 100.0 and h["BITS"] == 16
+
+
+def check_window_cube(path):
+    """The columns of a cube of windows, each with a number of its own; places as in an extension."""
+    with fits.open(path) as f:
+        check_camera(f[0].header)
+        assert (f[0].data[0] == pixels(FRAMES, 20, 10)).all()
+        row, = f["FRAMES"].data
+        assert (row["WINX0"], row["WINY0"], row["BINNING"], row["BITS"]) == (10, 4, 2, 8)
+        assert row["CRPIX1"] == 10.75 and row["CRPIX2"] == (18 - 4 + 0.5) / 2 + 0.5
+        assert list(row["OBSPOS"]) == [7.0e6 + FRAMES, -1.0e5, 2.5e5] and list(row["OBSVEL"]) == [10.0, 7400.0, -120.5]
+        assert [row[key] for key in FRACTIONS] == [0.25, 0.125, 0.0625]
+        assert 0.0 < row["WCSRESID"] < 1e-3
+        assert abs(row["MJD-AVG"] - (start_of(FRAMES) + 0.25 * u.s).mjd) < 1e-11
 
 
 def check_cube(path, places):
@@ -220,6 +247,7 @@ def main():
     places = np.loadtxt(os.path.join(folder, "places.txt"))
     check_extensions(os.path.join(folder, "ext[1].fits"), places)
     check_cube(os.path.join(folder, "cube.fits"), places)
+    check_window_cube(os.path.join(folder, "window_cube.fits"))
     for name in ("ext[1].fits", "cube.fits", "rice.fits", "killed_ext.fits", "killed_rice.fits"):
         check_sums(os.path.join(folder, name))
     check_killed(folder, places)

@@ -29,6 +29,7 @@ static bst_camera small_camera(void) {
     camera.width_px = WIDTH;
     camera.height_px = HEIGHT;
     camera.pixel_scale_arcsec = 50.0; /* half a degree: a field worth a WCS */
+    camera.dark_current_e_per_s = 0.3;
     return camera;
 }
 
@@ -53,7 +54,8 @@ static bst_fits_frame make_frame(bst_ctx *ctx, const bst_camera *camera, int64_t
                             .has_wcs = true,
                             .has_observer = true,
                             .observer_gcrf_m = {7.0e6 + (double)id, -1.0e5, 2.5e5},
-                            .observer_gcrf_mps = {10.0, 7400.0, -120.5}};
+                            .observer_gcrf_mps = {10.0, 7400.0, -120.5},
+                            .body_fraction = {0.25, 0.125, 0.0625}};
     bst_time epoch;
     bst_assert_ok(ctx, bst_time_from_utc(ctx, "2022-06-16T23:59:58.25Z", &epoch));
     frame.start = bst_time_add(epoch, (double)id);
@@ -143,6 +145,9 @@ static void test_astropy_reads(void **state) {
     bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
     fits = write_frames(&ctx, scratch_path(&s, "cube.fits"), CUBE, FRAMES);
     bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
+    fits = write_frames(&ctx, scratch_path(&s, "window_cube.fits"), CUBE, 0);
+    write_window(&ctx, fits);
+    bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
     fits = write_frames(&ctx, scratch_path(&s, "empty_cube.fits"), CUBE, 0);
     bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
     write_and_die(scratch_path(&s, "killed_ext.fits"), EXTENSIONS, FRAMES);
@@ -156,7 +161,7 @@ static void test_astropy_reads(void **state) {
     }
     write_places(&ctx, scratch_path(&s, "places.txt"));
     assert_false(scratch_has(scratch_path(&s, "empty_cube.fits")));
-    assert_int_equal(scratch_count(s.folder), 8); /* no table file is left by anyone */
+    assert_int_equal(scratch_count(s.folder), 9); /* no table file is left by anyone */
 
     char command[700];
     snprintf(command, sizeof command, "/usr/bin/python3 tests/io/check_fits.py '%s'", s.folder);

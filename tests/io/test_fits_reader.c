@@ -141,6 +141,35 @@ static void test_whole(void **state) {
     scratch_remove(&s);
 }
 
+/* The table of a cube that has fewer rows than the cube has planes: the others have no number. */
+static void test_short_table(void **state) {
+    (void)state;
+    scratch s;
+    scratch_make(&s);
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
+    write_file(&ctx, scratch_path(&s, "cube.fits"), CUBE, false);
+    size_t bytes, at = 2880;
+    uint8_t *data = load(scratch_path(&s, "cube.fits"), &bytes);
+    while (at + 2880 < bytes && memcmp(data + at, "XTENSION", 8) != 0) {
+        at += 2880;
+    }
+    while (memcmp(data + at, "NAXIS2  =", 9) != 0) {
+        at += 80;
+    }
+    memcpy(data + at + 10, "                   2", 20);
+    bst_fits_reader *reader;
+    bst_assert_ok(&ctx, bst_fits_reader_open_buffer(&ctx, "input", data, bytes, &reader));
+    for (int i = 0; i < FRAMES; i++) {
+        int64_t id;
+        bst_assert_ok(&ctx, bst_fits_reader_id(&ctx, reader, i, &id));
+        assert_int_equal(id, i < 2 ? 10 + 3 * i : -1);
+    }
+    bst_fits_reader_close(reader);
+    free(data);
+    scratch_remove(&s);
+}
+
 /* Frames of several windows: the file is as wide as its widest frame and as high as its highest. */
 static void test_windows(void **state) {
     (void)state;
@@ -332,6 +361,8 @@ static void test_messages(void **state) {
          "compressed by RICE_1, a row to a tile)"},
         {RICE, "ZNAXIS2 =", "                   9",
          "input: HDU 2: its table is not that of the compressed image it claims to be"},
+        {RICE, "ZNAXIS2 =", "                   7",
+         "input: HDU 2: its table is not that of the compressed image it claims to be"},
         {RICE, "NAXIS1  =", "                   7",
          "input: HDU 2: its table is not that of the compressed image it claims to be"},
         {RICE, "ZVAL1   =", "                   0",
@@ -448,10 +479,10 @@ static void test_rice_of_32_bits(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_whole),   cmocka_unit_test(test_cut_off),
-        cmocka_unit_test(test_damaged), cmocka_unit_test(test_messages),
-        cmocka_unit_test(test_rice),    cmocka_unit_test(test_rice_of_32_bits),
-        cmocka_unit_test(test_windows),
+        cmocka_unit_test(test_whole),           cmocka_unit_test(test_short_table),
+        cmocka_unit_test(test_cut_off),         cmocka_unit_test(test_damaged),
+        cmocka_unit_test(test_messages),        cmocka_unit_test(test_rice),
+        cmocka_unit_test(test_rice_of_32_bits), cmocka_unit_test(test_windows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

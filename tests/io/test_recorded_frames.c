@@ -149,6 +149,33 @@ static void test_keywords_and_sections(void **state) {
     end(&f);
 }
 
+/* Counts are the nearest whole numbers; a blank pixel has the median of the others. */
+static void test_counts(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_keyword_map map = {.pedestal_dn = 7.0, .dn_per_unit = 4.0};
+    const float none = (float)NAN;
+    /* sorted, of those that are there: -3, 0.1, 0.15, 2, 20000, so that 7 + 4 * 0.15 fills */
+    const float pixels[] = {none, 2.0f, none, 0.1f, none, 20000.0f, none, -3.0f, none, 0.15f, none};
+    const uint16_t expected[] = {8, 15, 8, 7, 8, 65535, 8, 0, 8, 8, 8};
+    uint16_t dn[11];
+    int64_t clipped, blank;
+    bst_assert_ok(&ctx, bst_recorded_counts(&ctx, pixels, 11, &map, dn, &clipped, &blank));
+    for (int i = 0; i < 11; i++) {
+        assert_int_equal(dn[i], expected[i]);
+    }
+    assert_int_equal(clipped, 2);
+    assert_int_equal(blank, 6);
+    /* without a map pixels are counts */
+    const float whole[] = {0.49f, 0.51f, 65535.25f, 41.5f};
+    const uint16_t rounded[] = {0, 1, 65535, 42};
+    bst_assert_ok(&ctx, bst_recorded_counts(&ctx, whole, 4, NULL, dn, &clipped, NULL));
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(dn[i], rounded[i]);
+    }
+    assert_int_equal(clipped, 0);
+}
+
 /* Values of each plane are in the table behind a cube. */
 static void test_cube_table(void **state) {
     (void)state;
@@ -471,7 +498,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(test_cube_table), cmocka_unit_test(test_messages),
         cmocka_unit_test(test_limits),     cmocka_unit_test(test_truncated),
         cmocka_unit_test(test_mutations),  cmocka_unit_test(test_files),
-        cmocka_unit_test(test_rate_trend),
+        cmocka_unit_test(test_rate_trend), cmocka_unit_test(test_counts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

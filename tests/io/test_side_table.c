@@ -232,6 +232,8 @@ static void test_messages(void **state) {
         {"path,WHEN,ms,page\ncube.tif,1,2,3\n", {"line 2: column page", "fewer than this"}},
         {"path,WHEN,ms,page\ncube.tif,1,2,x\n", {"line 2: column page", "\"x\" is no page"}},
         {"path,page\ncube.tif,1\na.png,1\ncube.tif,1\n", {"line 4: column path", "in line 2, too"}},
+        {"path,page\ncube.tif,2\ncube.tif,1\ncube.tif,2\n",
+         {"line 4: column path", "in line 2, too"}},
         {"path,ms,MS\na.png,1,2\n", {"line 1: column MS", "twice, as columns 2 and 3"}},
         {"name,ms\na.png,1\n", {"line 1: has no column", "path|file"}},
         {"path;ms\na.png;1\n", {"line 1: has column names", "(allowed: by commas)"}},

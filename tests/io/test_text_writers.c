@@ -323,6 +323,54 @@ static void bad_calls_are_refused(void **state) {
     }
 }
 
+/* Names of an object: what is UTF-8 stays, each byte of anything else is a question mark (RFC 3629,
+ * section 4: the first and the last characters of each length, and what is next to them). */
+static void names_are_utf8(void **state) {
+    (void)state;
+    static const struct {
+        const char *bytes;
+        bool good;
+    } cases[] = {{"\x7F", true},
+                 {"\x80", false},
+                 {"\xC1\xBF", false},
+                 {"\xC2\x80", true},
+                 {"\xC2\x7F", false},
+                 {"\xDF\xBF", true},
+                 {"\xDF\xC0", false},
+                 {"\xE0\x9F\xBF", false},
+                 {"\xE0\xA0\x80", true},
+                 {"\xED\x9F\xBF", true},
+                 {"\xED\xA0\x80", false},
+                 {"\xEE\x80\x80", true},
+                 {"\xEF\xBF\xBF", true},
+                 {"\xEF\xBF", false},
+                 {"\xF0\x8F\xBF\xBF", false},
+                 {"\xF0\x90\x80\x80", true},
+                 {"\xF4\x8F\xBF\xBF", true},
+                 {"\xF4\x90\x80\x80", false},
+                 {"\xF5\x80\x80\x80", false},
+                 {"\xF1\x80\x80\x41", false}};
+    bst_ctx ctx = {0};
+    double step_s = 1.0;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char expected[64] = "\"name\":\"a", *buffer = NULL;
+        for (const char *c = cases[i].bytes; *c; c++) {
+            bool ascii = (unsigned char)*c < 0x80;
+            strncat(expected, cases[i].good || ascii ? c : "?", 1);
+        }
+        strcat(expected, "\",");
+        size_t bytes = 0;
+        char name[16];
+        snprintf(name, sizeof name, "a%s", cases[i].bytes);
+        FILE *stream = open_memstream(&buffer, &bytes);
+        const bst_czml_object object = {.id = "x", .name = name, .series = {3, line_row, &step_s}};
+        bst_assert_ok(&ctx, bst_czml_write_object(&ctx, stream, &object));
+        char *text = text_of(stream, &buffer);
+        assert_non_null(strstr(text, expected));
+        free(text);
+    }
+}
+
 /* Mean elements in the units of an OMM, each number another one; angles from 0 to 360 degrees. */
 static void an_omm_has_degrees_and_revolutions(void **state) {
     (void)state;
@@ -365,6 +413,15 @@ static void an_omm_has_degrees_and_revolutions(void **state) {
     }
     assert_non_null(strstr(text, "\"EPOCH\": \"2022-06-16T22:10:00.250000\""));
     assert_non_null(strstr(text, "a \\\"word\\\""));
+    assert_non_null(strstr(text, "\"OBJECT_NAME\": \"SAT\""));
+    assert_non_null(strstr(text, "\"OBJECT_ID\": \"UNKNOWN\""));
+    e.name[0] = '\0';
+    snprintf(e.designator, sizeof e.designator, "1998-067A");
+    stream = fmemopen(text, sizeof text, "w");
+    bst_assert_ok(&ctx, bst_omm_write(&ctx, stream, &e, "2022-06-17T00:00:00", "TEST", NULL));
+    fclose(stream);
+    assert_non_null(strstr(text, "\"OBJECT_NAME\": \"UNKNOWN\""));
+    assert_non_null(strstr(text, "\"OBJECT_ID\": \"1998-067A\""));
 }
 
 int main(void) {
@@ -375,6 +432,7 @@ int main(void) {
         cmocka_unit_test(czml_is_what_cesium_reads),
         cmocka_unit_test(tdm_states_its_corrections),
         cmocka_unit_test(an_omm_has_degrees_and_revolutions),
+        cmocka_unit_test(names_are_utf8),
         cmocka_unit_test(bad_calls_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -270,6 +270,14 @@ static void wrong_headers_are_refused(void **state) {
          BST_WIRE_BAD_HEADER},
         {"[1,", BST_WIRE_BAD_HEADER},
         {"{\"a\":[[[[[[[[[[]]]]]]]]]],", BST_WIRE_BAD_HEADER},
+        /* members that are not known are skipped, 8 levels deep */
+        {"{\"a\":[[{\"b\":[[[[[1]]]]]}]],\"version\":9,\"type\":\"done\",\"tick\":0,\"sequence\":0,"
+         "\"lengths\":[16],\"crcs\":[\"00000000\"],",
+         BST_WIRE_GOOD},
+        {"{\"a\":[[{\"b\":[[[[[[1]]]]]]}]],\"version\":9,\"type\":\"done\",\"tick\":0,\"sequence\":"
+         "0,"
+         "\"lengths\":[16],\"crcs\":[\"00000000\"],",
+         BST_WIRE_BAD_HEADER},
         {"", BST_WIRE_BAD_HEADER},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {

@@ -207,7 +207,7 @@ class Library:
                     for number, _, _ in f.bugs:
                         self.bugs.pop(number, None)
         with open(os.path.join(self.tree.build, "build.ninja"), encoding="utf-8") as file:
-            for archive, members in re.findall(r"^build (\S+\.a): \w*STATIC_LIBRARY_LINKER\w+ (.*?) \|", file.read() + "\n", re.M):
+            for archive, members in re.findall(r"^build (\S+\.a): \w*STATIC_LIBRARY_LINKER\w+ (.*?)(?: \||$)", file.read() + "\n", re.M):
                 members = [m for m in members.split() if m.endswith(".o")]
                 if any(objects.get(m) for m in members):
                     copy = os.path.join(self.scratch, archive.replace("/", "_"))

@@ -210,6 +210,7 @@ def main():
     parser.add_argument("--log", help="file for the outcomes, from which a run that was ended goes on")
     parser.add_argument("--suite", choices=["near", "kept", "unit", "e2e", "all"], default="all")
     parser.add_argument("--longest", type=float, default=120.0, metavar="SECONDS", help="leave out tests that need more (120)")
+    parser.add_argument("--alone", action="store_true", help="one bug at a time in the scenes too: quicker where most are noticed")
     parser.add_argument("--tests", default="", help="only those (or scenes) whose names hold this regular expression")
     options = parser.parse_args()
     tree = QuickTree(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), options.build, 2)
@@ -228,7 +229,7 @@ def main():
         if options.suite in ("kept", "all"):
             for name, command in kept_scenes(tree, judge.command("e2e_figures_kept")).items():
                 if re.search(options.tests, name):
-                    judge.run(name, command, options.longest, True)
+                    judge.run(name, command, options.longest, not options.alone)
         ends = [n for n, (labels, _, _) in tree.tests.items() if "e2e" in labels and "slow" not in labels and n != "e2e_figures_kept"]
         for name, _ in units if options.suite in ("unit", "all") else []:
             if re.search(options.tests, name) and (command := judge.command(name)):

@@ -430,8 +430,34 @@ static void off_and_without_objects(void **state) {
     bst_world_free(world);
 }
 
+/* A drift that wanders, by a variance of n^2 a day, displaces an object after T days by a variance
+ * of n^2 T^3 / 3 along its orbit, without any update. */
+static void drifts_wander_until_the_end(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double days = 1.5, noise[2] = {0.0, 3000.0};
+    bst_world *world = world_of_two();
+    double variance[2];
+    for (int k = 0; k < 2; k++) {
+        bst_scenario scenario = SCENARIO(5, 0);
+        bst_run_custody *c;
+        bst_custody_figures f;
+        scenario.record.custody_noise_m_per_day = noise[k];
+        bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &scenario, NULL, &c));
+        bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, days * BST_DAY_S));
+        assert_true(bst_run_custody_figures(c, &f));
+        variance[k] = f.sigma_median_m * f.sigma_median_m;
+        bst_run_custody_free(c);
+    }
+    double grown = noise[1] * noise[1] * days * days * days / 3.0;
+    /* of the middle one of three objects, whose orbit is nearly a circle */
+    bst_assert_close((variance[1] - variance[0]) / grown, 1.0, 0.04);
+    bst_world_free(world);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(drifts_wander_until_the_end),
         cmocka_unit_test(tracks_update_their_objects),
         cmocka_unit_test(saved_states_go_on),
         cmocka_unit_test(a_track_is_used_once),

@@ -27,8 +27,10 @@ static void directions_and_their_errors(void **state) {
     const bst_light light = {.velocity_mps = {-21000.0, 15000.0, 9000.0},
                              .sun_m = {1.2e11, 8e10, 3e10}};
     const bst_quat q = bst_quat_unit((bst_quat){0.3, -0.5, 0.2, 0.7});
-    const bst_attitude_fix attitude = {
-        .valid = true, .q_cam_from_gcrf = q, .sigma_rad = {4e-5, 9e-5, 7e-4}};
+    const bst_attitude_fix attitude = {.valid = true,
+                                       .q_cam_from_gcrf = q,
+                                       .sigma_rad = {4e-5, 9e-5, 7e-4},
+                                       .correlation = {0.5, 0.6, 0.3}}; /* xy, xz, yz */
     const double x = 840.0, y = 30.0, cov[3] = {0.09, -0.05, 0.16};
     double middle[5] = {x, y, 0.0, 0.0, 0.0}, j[2][5], full[5][5] = {{0.0}}, sum[2][2] = {{0.0}};
     const bst_vec3 seen = direction_at(&c, q, &light, middle);
@@ -56,6 +58,9 @@ static void directions_and_their_errors(void **state) {
     for (int i = 0; i < 3; i++) {
         full[2 + i][2 + i] = attitude.sigma_rad[i] * attitude.sigma_rad[i];
     }
+    full[2][3] = full[3][2] = 0.5 * 4e-5 * 9e-5;
+    full[2][4] = full[4][2] = 0.6 * 4e-5 * 7e-4;
+    full[3][4] = full[4][3] = 0.3 * 9e-5 * 7e-4;
     bst_od_observation out = {.shared_change = 0.0};
     bst_run_measure_direction(&c, x, y, cov, &attitude, &light, &out);
     bst_assert_close(bst_vec3_angle(out.direction, seen), 0.0, 1e-11);
@@ -67,10 +72,14 @@ static void directions_and_their_errors(void **state) {
                 }
             }
             /* of the shared parts, about camera x and y, only products matter */
+            double shared = 0.0, about_xy = 0.0;
             for (int i = 0; i < 2; i++) {
-                bst_assert_close(out.shared_rad[a][i] * out.shared_rad[b][i],
-                                 j[a][2 + i] * j[b][2 + i] * full[2 + i][2 + i], 1e-3 * 1e-8);
+                shared += out.shared_rad[a][i] * out.shared_rad[b][i];
+                for (int k = 0; k < 2; k++) {
+                    about_xy += j[a][2 + i] * full[2 + i][2 + k] * j[b][2 + k];
+                }
             }
+            bst_assert_close(shared, about_xy, 1e-3 * 1e-8);
         }
     }
     /* aberration changes scales by 1e-4 */

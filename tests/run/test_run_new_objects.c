@@ -182,6 +182,52 @@ static void carried_filters_predict_the_same(void **state) {
     }
 }
 
+/* A filter whose errors are independent, each of `sigma`. */
+static bst_custody_filter even_filter(double sigma) {
+    bst_custody_filter f = {.noise_until_s = 0.0};
+    for (int i = 0; i < BST_CUSTODY_STATE; i++) {
+        f.p[i][i] = sigma * sigma;
+    }
+    return f;
+}
+
+/* Two orbits are of one object if their difference is within its error, of both, and that error is
+ * less than 5 km; whichever is the first. */
+static void orbits_of_one_object(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double time_s = 0.4 * BST_DAY_S;
+    const bst_elements set = {.norad = 7,
+                              .epoch_utc_jd1 = 2459746.5,
+                              .eccentricity = 0.02,
+                              .inclination_rad = 0.9,
+                              .raan_rad = 1.0,
+                              .arg_perigee_rad = 2.0,
+                              .mean_anomaly_rad = 0.5,
+                              .mean_motion_radpmin = 0.02};
+    bst_custody_orbit orbit;
+    bst_vec3 place;
+    double unit;
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &orbit));
+    bst_custody_filter a = even_filter(1.0);
+    assert_true(bst_custody_predict_position(&orbit, &a, time_s, &place, &unit));
+    for (int swap = 0; swap < 2; swap++) {
+        for (int above = 0; above < 2; above++) { /* hypot(1.2, 4.8) km is 4.95 km */
+            const bst_custody_filter two[2] = {even_filter(1200.0 / unit),
+                                               even_filter((above ? 4950.0 : 4750.0) / unit)};
+            assert_int_equal(bst_run_new_object_is(&orbit, &two[swap], &orbit, &two[!swap], time_s),
+                             !above);
+            /* chi-square 284.4 of 30 m and 60 m */
+            bst_custody_filter own = even_filter(30.0), other = even_filter(60.0);
+            const double most_m = sqrt(9.0 * 31.6 * (30.0 * 30.0 + 60.0 * 60.0));
+            own.x[BST_CUSTODY_ALONG] = (above ? 1.05 : 0.95) * most_m;
+            assert_int_equal(swap ? bst_run_new_object_is(&orbit, &other, &orbit, &own, time_s)
+                                  : bst_run_new_object_is(&orbit, &own, &orbit, &other, time_s),
+                             !above);
+        }
+    }
+}
+
 /* An object of tracks that the filters do not explain, though the first new one has its orbit
  * already: that one keeps it, and what it was updated by. */
 static void earlier_new_objects_keep_their_orbit(void **state) {
@@ -317,6 +363,7 @@ int main(void) {
         cmocka_unit_test(candidates_become_objects),
         cmocka_unit_test(new_objects_match_the_catalogue),
         cmocka_unit_test(carried_filters_predict_the_same),
+        cmocka_unit_test(orbits_of_one_object),
         cmocka_unit_test(earlier_new_objects_keep_their_orbit),
         cmocka_unit_test(wrong_objects_are_counted_once),
         cmocka_unit_test(saved_candidates_are_of_the_world),

@@ -6,6 +6,7 @@
 
 #include "boresight/frame.h"
 #include "boresight/messages.h"
+#include "sim/core/wall_clock.h"
 #include "tests/test_support.h"
 #include "view/live_feed.h"
 
@@ -255,11 +256,27 @@ static void what_is_taken_is_got(void **state) {
     end();
 }
 
+/* Who asks for a frame that is not there waits as long as it says. */
+static void a_frame_is_waited_for(void **state) {
+    (void)state;
+    begin();
+    const double waits_s[] = {0.0, 0.12, 1.05}; /* beyond a second the clock's own carries */
+    for (int k = 0; k < 3; k++) {
+        const double begun = bst_wall_seconds();
+        assert_null(bst_view_feed_get(f.feed, 1, 0, waits_s[k]));
+        const double waited = bst_wall_seconds() - begun;
+        assert_true(waited >= waits_s[k] - 1e-3 && waited < waits_s[k] + 0.9);
+    }
+    assert_null(bst_view_feed_get(f.feed, 3, 0, 9.0)); /* there is no such sensor */
+    end();
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_taken_is_got),
         cmocka_unit_test(a_frame_is_complete_with_its_tracks),
         cmocka_unit_test(frames_that_lack_a_part),
+        cmocka_unit_test(a_frame_is_waited_for),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

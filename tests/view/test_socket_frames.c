@@ -159,6 +159,30 @@ static void half_a_frame_ends_the_connection(void **state) {
     expect_end("\x81\x05hello", 7, 0.0, 1002);
 }
 
+/* Each silence has a limit of its own: before the first frame, between two, within one. */
+static void silences_of_three_lengths(void **state) {
+    (void)state;
+    const double limit_s[3] = {1.2, 0.6, 0.05}; /* far apart: other programs delay this one */
+    unsigned char out[64];
+    for (int k = 0; k < 3; k++) {
+        int client;
+        bst_view_peer peer = connect_pair(&client);
+        peer.first_s = limit_s[0];
+        peer.idle_s = limit_s[1];
+        peer.frame_s = limit_s[2];
+        const char *text;
+        size_t bytes, n = k > 0 ? frame(0x81, "one", 3, out) : 0;
+        assert_int_equal(write(client, out, n), n);
+        assert_true(k == 0 || bst_view_next_text(&peer, &text, &bytes));
+        assert_int_equal(write(client, out, k == 2), k == 2);
+        const double begin = bst_wall_seconds();
+        assert_false(bst_view_next_text(&peer, &text, &bytes));
+        const double waited = bst_wall_seconds() - begin;
+        assert_true(waited >= limit_s[k] - 1e-3 && (k == 0 || waited < limit_s[k - 1]));
+        disconnect(&peer, client);
+    }
+}
+
 /* Sends a byte of a long frame each 20 ms. */
 static void *drip(void *user) {
     const int fd = *(const int *)user;
@@ -244,6 +268,7 @@ int main(void) {
         cmocka_unit_test(a_head_alone_is_refused),
         cmocka_unit_test(texts_are_handed_over_and_pings_answered),
         cmocka_unit_test(half_a_frame_ends_the_connection),
+        cmocka_unit_test(silences_of_three_lengths),
         cmocka_unit_test(a_slow_frame_ends_the_connection),
         cmocka_unit_test(who_takes_nothing_is_given_up),
         cmocka_unit_test(sockets_are_found_by_their_ports),
