@@ -326,6 +326,10 @@ def scene_crowded(k):
     k.run("crowded", kept_scenes.crowded())
 
 
+def scene_drawn(k):
+    k.run("drawn", kept_scenes.drawn())
+
+
 def scene_streaked(k):
     k.run("streaked", kept_scenes.streaked())
 
@@ -379,7 +383,7 @@ def scene_orbits(k):
 SCENES = {name[len("scene_"):]: function for name, function in sorted(globals().items()) if name.startswith("scene_")}
 # quick ones and those that are odd in the most ways first
 ORDER = ["unlike", "restored", "orbits", "unlike_derived", "charge", "tasking", "oem", "rolling", "wide", "visible", "infrared", "passing", "studies",
-         "crowded", "streaked", "linked", "files", "lost", "search", "rate", "recorded"]
+         "crowded", "drawn", "streaked", "linked", "files", "lost", "search", "rate", "recorded"]
 
 
 def kept_path(name):
