@@ -1,6 +1,7 @@
-/* One hypothesis of a target's pose: its prediction against the motion itself, its loss against
- * derivatives, and the covariance of a fit against derivatives of predicted outlines. */
-#include "imgproc/extended/pose_filter.h"
+/* Hypotheses of a target's pose: their prediction against the motion itself, their loss against
+ * derivatives, the covariance of a fit against derivatives of predicted outlines, and their mean.
+ */
+#include "imgproc/extended/pose_bank.h"
 #include "tests/test_support.h"
 
 enum { N = BST_POSE_STATES, M = BST_POSE_UNKNOWNS };
@@ -265,9 +266,89 @@ static void covariance_of_a_fit(void **state) {
     bst_target_model_free(model);
 }
 
+/* The estimate is the mean of the hypotheses with the weights of their scores, and its covariance
+ * is theirs about it, those of a cost above its six degrees of freedom widened. Outlines are the
+ * model's own, of a body that tumbles, and the place found is right. */
+static void mean_of_hypotheses(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_target_model *model;
+    bst_assert_ok(
+        &ctx, bst_target_model_load(&ctx, "scenarios/satellites/inspection_client.json", &model));
+    static bst_pose_bank bank;
+    memset(&bank, 0, sizeof bank);
+    int mixed = 0, last = -1;
+    for (int frame = 0; frame < 14; frame++) {
+        bst_target_sight sight = {.q_local_from_gcrf = BST_QUAT_IDENTITY,
+                                  .sun_local = bst_vec3_unit((bst_vec3){0.2, -0.1, -0.95}),
+                                  .scale_rad = SCALE,
+                                  .full_e = 1e5,
+                                  .least_e = 10.0,
+                                  .model_sigma = 0.002};
+        const bst_target_pose truth = {
+            .q_body_from_gcrf = bst_quat_from_rotvec((bst_vec3){0.3 + 0.04 * frame, -0.9, 0.7}),
+            .x_px = 5.0,
+            .y_px = -8.0,
+            .depth_m = 80.0 - 0.3 * frame};
+        bst_target_outline o;
+        assert_true(bst_target_model_predict(model, &sight, &truth, &o));
+        for (int k = 0; k < BST_TARGET_DIRECTIONS; k++) { /* frames with larger errors as well */
+            sight.support_px[k] = o.support_px[k] + 0.4 * (frame % 3) * sin(7.0 * k + frame);
+        }
+        for (int k = 0; k < BST_TARGET_DIRECTIONS / 2; k++) {
+            sight.size_px =
+                fmax(sight.size_px, o.support_px[k] + o.support_px[k + BST_TARGET_DIRECTIONS / 2]);
+        }
+        bst_pose_estimate e;
+        last = bst_pose_bank_step(&bank, model, &sight, 2.0 * frame, 70.0, &e);
+        assert_true(bank.count > 0);
+        double sum = 0.0, mean[3] = {0}, c[3] = {0}, depth = 0.0, best = INFINITY;
+        for (int i = 0; i < bank.count; i++) {
+            best = fmin(best, bank.filter[i].score);
+        }
+        bst_assert_close(bank.filter[0].score, best, 0.0); /* the best first */
+        for (int pass = 0; pass < 2; pass++) {
+            for (int i = 0; i < bank.count; i++) {
+                const bst_pose_filter *f = &bank.filter[i];
+                double w = exp(-0.5 * (f->score - best)), log_depth = log(f->pose.depth_m);
+                double more = fmax(f->cost / 6.0, 1.0);
+                if (pass == 0) {
+                    sum += w;
+                    mean[0] += w * f->pose.x_px;
+                    mean[1] += w * f->pose.y_px;
+                    mean[2] += w * log_depth;
+                    continue;
+                }
+                double dx = f->pose.x_px - mean[0], dy = f->pose.y_px - mean[1];
+                c[0] += w / sum * (more * f->centre_xx + dx * dx);
+                c[1] += w / sum * (more * f->centre_xy + dx * dy);
+                c[2] += w / sum * (more * f->centre_yy + dy * dy);
+                depth += w / sum * (f->covariance[6 * N + 6] + pow(log_depth - mean[2], 2));
+            }
+            for (int k = 0; k < 3 && pass == 0; k++) {
+                mean[k] /= sum;
+            }
+        }
+        mixed += sum > 1.01;
+        bst_assert_close(e.x_px, mean[0], 1e-9); /* rounding of squares of 10 px */
+        bst_assert_close(e.y_px, mean[1], 1e-9);
+        bst_assert_close(log(e.depth_m), mean[2], 1e-9);
+        bst_assert_close(e.cov_xx, c[0], 1e-9 * (1.0 + c[0]));
+        bst_assert_close(e.cov_xy, c[1], 1e-9 * (1.0 + c[0]));
+        bst_assert_close(e.cov_yy, c[2], 1e-9 * (1.0 + c[2]));
+        bst_assert_close(e.depth_sigma_share, sqrt(depth), 1e-7);
+        if (frame >= 10) {
+            assert_true(hypot(e.x_px - 5.0, e.y_px + 8.0) < 0.5); /* of a body of 90 px */
+            bst_assert_close(e.depth_m / truth.depth_m, 1.0, 0.01);
+        }
+    }
+    assert_true(last == 1 && mixed >= 2);
+    bst_target_model_free(model);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(prediction),
-                                       cmocka_unit_test(noise_of_the_rate), cmocka_unit_test(loss),
-                                       cmocka_unit_test(covariance_of_a_fit)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(prediction), cmocka_unit_test(noise_of_the_rate), cmocka_unit_test(loss),
+        cmocka_unit_test(covariance_of_a_fit), cmocka_unit_test(mean_of_hypotheses)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
