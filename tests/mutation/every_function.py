@@ -89,6 +89,11 @@ class Function:
                 f"switch (bst_mutant_choice({self.number})) {{\n{cases}default: break;\n}}\n{self.body}}}\n")
 
 
+def feature_macros(text):
+    """Macros by which a source asks for declarations: they must come before the first header, that of the choice included."""
+    return "".join(re.findall(r"^#define _\w+_SOURCE\b.*\n", text, re.M))
+
+
 def split_parameters(text):
     parts, depth, now = [], 0, ""
     for c in text:
@@ -152,7 +157,7 @@ class Library:
         place = os.path.join(self.scratch, path)
         os.makedirs(os.path.dirname(place), exist_ok=True)
         with open(place, "w", encoding="utf-8") as file:
-            file.write(CHOICE + text)
+            file.write(feature_macros(text) + CHOICE + text)
         return place
 
     def compile_object(self, target, paths):
@@ -170,7 +175,8 @@ class Library:
                 unit = made + ".c"
                 with open(unit, "w", encoding="utf-8") as file:
                     file.write(together)
-            result = build_files.run([*self.tree.words_of(entry), "-O1", "-w", "-iquote", os.path.join(self.tree.folder, os.path.dirname(paths[0])),
+            result = build_files.run([*self.tree.words_of(entry), "-O1", "-w", "-Werror=implicit-function-declaration",
+                                      "-iquote", os.path.join(self.tree.folder, os.path.dirname(paths[0])),
                                       "-o", made, "-c", unit], cwd=entry["directory"])
             if result.returncode == 0:
                 return made

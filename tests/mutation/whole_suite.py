@@ -21,7 +21,7 @@ import shutil
 import sys
 import tempfile
 
-from every_function import FUNCTION, Function, Library, passes
+from every_function import FUNCTION, Function, Library, feature_macros, passes
 from mutate import blank_comments, wilson
 from quick_tree import QuickTree
 
@@ -111,7 +111,7 @@ class Listed(Library):
         with open(place, encoding="utf-8") as file:
             text = file.read()
         with open(place, "w", encoding="utf-8") as file:
-            file.write(CHOICE + text[text.index("#endif\n") + len("#endif\n"):])
+            file.write(feature_macros(text) + CHOICE + text[text.index("#endif\n") + len("#endif\n"):])
         return place
 
 
