@@ -422,13 +422,14 @@ def drawn():
     first["cue"].update(offset_deg=0.1, offset_axis="y", sigma_deg=0.1, v_mag=9)
     first["modules"].pop("scenegen")
     first["modules"]["control"]["exposure_s"] = 0.2
-    first["modules"]["obsgen"] = {"type": "statistical", "star_limit_v_mag": 10.5}
+    first["modules"]["obsgen"]["star_limit_v_mag"] = 10.5
     first["modules"]["imgproc"].update(false_splits=0.02, false_alarms_per_frame=3, jitter_px=0.3, motion_bend_px=0.05, mesh_px=48)
     second, third, fourth = (copy.deepcopy(first) for _ in range(3))
     second["name"] = "smeared"
     second["modules"]["gimbal"]["platform"].update(drift_arcsec_per_s=[260, -190, 0], jitter_low_px_rms=3, jitter_low_cutoff_hz=2)
     second["exposure"]["exposure_s"] = second["modules"]["control"]["exposure_s"] = 0.9
     third["name"] = "coarse"
+    third["modules"]["obsgen"]["calibration_file"] = "theory"
     third["camera"].update(width_px=630, height_px=480, rotation_deg=29, pixel_scale_arcsec=15,
                            ghosts=[{"intensity": 0.004, "factor": -0.7, "centre_px": [14, -8], "radius_px": 12, "inner_radius_px": 4}])
     third["exposure"].update(binning=3, window_px=[9, 15, 600, 450])
