@@ -489,3 +489,43 @@ def checks():
             "passing": changed(passing(), {"/duration_s": 7000, gimbal + "/rate_limit_degps": 0.6, gimbal + "/accel_limit_degps2": 0.2}),
             "sun": changed(ideal, {gimbal + "/ra_deg": 85.1, gimbal + "/dec_deg": 23.36, "/duration_s": 3000}),
             "late": changed(rate(), {"/duration_s": 25000})}
+
+
+def drawn():
+    """Detections that are drawn, for four cameras: a diffraction image with bright stars at rest, as streaks along an uneven path, binned
+    by three with ghosts, and a Gaussian that is lost in space."""
+    scene = track(**{"epoch_utc": "2022-06-16T23:40:00Z"})
+    scene["world"].update(faint_stars="statistical", faint_limit_v_mag=10, objects=scene["world"]["objects"] + [
+        {"name": "NEAR", "area_m2": 40, "albedo": 0.2,
+         "orbit": {"source": "relative", "reference": "INMARSAT GX5", "offset_rtn_m": [9000, -14000, 7000], "rate_rtn_mps": [3, -20, 30]}}])
+    scene["world"]["objects"][0]["area_m2"] = 300
+    first = scene["observers"][0]["sensors"][0]
+    first.update(name="sharp", observation_source="generator")
+    first["camera"].update(width_px=420, height_px=330, pixel_scale_arcsec=40, rotation_deg=-117, aperture_m=0.2, full_well_e=22000,
+                           optics={"psf": "diffraction", "q": 2.0, "diffusion_px": 0.25})
+    first["camera"].pop("psf_fwhm_px")
+    first["exposure"].update(exposure_s=0.2, period_s=1.1, window_px=[12, 6, 400, 320])
+    first["cue"].update(offset_deg=0.1, offset_axis="y", sigma_deg=0.1, v_mag=9)
+    first["modules"].pop("scenegen")
+    first["modules"]["control"]["exposure_s"] = 0.2
+    first["modules"]["obsgen"]["star_limit_v_mag"] = 10.5
+    first["modules"]["imgproc"].update(false_splits=0.02, false_alarms_per_frame=3, jitter_px=0.3, motion_bend_px=0.05, mesh_px=48)
+    second, third, fourth = (copy.deepcopy(first) for _ in range(3))
+    second["name"] = "smeared"
+    second["modules"]["gimbal"]["platform"].update(drift_arcsec_per_s=[260, -190, 0], jitter_low_px_rms=3, jitter_low_cutoff_hz=2)
+    second["exposure"]["exposure_s"] = second["modules"]["control"]["exposure_s"] = 0.9
+    third["name"] = "coarse"
+    third["modules"]["obsgen"]["calibration_file"] = "theory"
+    third["camera"].update(width_px=630, height_px=480, rotation_deg=29, pixel_scale_arcsec=15,
+                           ghosts=[{"intensity": 0.004, "factor": -0.7, "centre_px": [14, -8], "radius_px": 12, "inner_radius_px": 4}])
+    third["exposure"].update(binning=3, window_px=[9, 15, 600, 450])
+    fourth["name"] = "lost"
+    fourth["camera"].pop("optics")
+    fourth["camera"].update(width_px=380, height_px=470, psf_fwhm_px=1.9, rotation_deg=73, aperture_m=0.1)
+    fourth["exposure"]["window_px"] = [0, 0, 380, 470]
+    fourth["modules"]["imgproc"].update(attitude="unknown", lost_after_frames=3)
+    fourth["modules"]["control"]["attitude"] = "unknown"
+    fourth["modules"]["gimbal"]["platform"]["attitude_bias_arcsec"] = [700, -900, 2500]
+    scene["observers"][0]["sensors"] += [second, third, fourth]
+    scene.update(name="drawn", duration_s=4.6, seed="0x64", record={"frames": "none"})
+    return scene

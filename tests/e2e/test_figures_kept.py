@@ -352,6 +352,10 @@ def scene_crowded(k):
     k.run("crowded", kept_scenes.crowded())
 
 
+def scene_drawn(k):
+    k.run("drawn", kept_scenes.drawn())
+
+
 def scene_streaked(k):
     k.run("streaked", kept_scenes.streaked())
 
@@ -467,7 +471,7 @@ def scene_sensor(k):
 SCENES = {name[len("scene_"):]: function for name, function in sorted(globals().items()) if name.startswith("scene_")}
 # quick ones and those that are odd in the most ways first
 ORDER = ["unlike", "restored", "orbits", "checks", "unlike_derived", "charge", "tasking", "oem", "rolling", "wide", "visible", "infrared", "passing",
-         "studies", "crowded", "streaked", "measured", "sensor", "twin", "linked", "shown",
+         "studies", "crowded", "drawn", "streaked", "measured", "sensor", "twin", "linked", "shown",
          "reported", "files", "lost", "search", "rate", "recorded"]
 
 

@@ -2,6 +2,7 @@
  * photometry. */
 #include <fitsio.h>
 
+#include "imgproc/calibrate/bad_map.h"
 #include "imgproc/calibrate/calibration.h"
 #include "tests/imgproc/module_support.h"
 #include "tests/io/scratch.h"
@@ -202,9 +203,44 @@ static void hot_column_and_vignetting_are_taken_off(void **state) {
     scratch_remove(&place);
 }
 
+/* Listed pixels and those of a map, on sensors that are not square; pixels beyond either side are
+ * refused. */
+static void listed_bad_pixels(void **state) {
+    (void)state;
+    for (int tall = 0; tall < 2; tall++) {
+        const int width = tall ? 30 : 47, height = tall ? 47 : 30;
+        const bst_camera camera = {.width_px = width, .height_px = height};
+        uint8_t map[30 * 47] = {0}, *out = NULL;
+        map[5 * width + 28] = 1;
+        bst_imgproc_bad_pixel all[3] = {{3, 11}, {width - 1, 0}, {7, height - 1}};
+        const bst_config_list list = {all, 3};
+        bst_imgproc_maps maps = {0};
+        maps.bad = map;
+        bst_ctx ctx = {0};
+        bst_assert_ok(&ctx, bst_bad_map_create(&ctx, &camera, &maps, &list, &out));
+        for (int y = 0; y < height; y++) {
+            for (int x = 0; x < width; x++) {
+                bool bad = x == 28 && y == 5;
+                for (int k = 0; k < 3; k++) {
+                    bad = bad || (x == all[k].x && y == all[k].y);
+                }
+                assert_int_equal(out[y * width + x], bad);
+            }
+        }
+        free(out);
+        for (int k = 0; k < 2; k++) { /* one beyond the shorter side alone */
+            all[2] = (bst_imgproc_bad_pixel){k ? 0 : width, k ? height : 0};
+            assert_int_equal(bst_bad_map_create(&ctx, &camera, &maps, &list, &out), BST_ERR_CONFIG);
+            assert_non_null(strstr(ctx.message, "bad_pixels/2"));
+            free(out);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(wrong_maps_are_refused),
+        cmocka_unit_test(listed_bad_pixels),
         cmocka_unit_test(the_module_says_which_file),
         cmocka_unit_test(hot_column_and_vignetting_are_taken_off),
     };

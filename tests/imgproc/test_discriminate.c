@@ -276,9 +276,56 @@ static void suspected_pixels(void **state) {
     end(&s);
 }
 
+/* Charge of one frame is remembered for eight frames that cover its pixel without charge, and for
+ * any number of frames whose windows leave its column or its row out; on sensors that are wider
+ * than high and the other way round. A pixel beside it holds no charge of it. */
+static void charge_outside_of_windows(void **state) {
+    (void)state;
+    static const struct {
+        int width, height, x, y; /* of the sensor and of the charge */
+        bst_window other;        /* leaves it out */
+    } all[] = {{90, 60, 80, 12, {0, 0, 70, 60}},   {90, 60, 80, 12, {0, 15, 90, 45}},
+               {60, 90, 11, 77, {0, 0, 60, 70}},   {60, 90, 11, 77, {14, 0, 46, 90}},
+               {60, 90, 50, 83, {20, 10, 31, 73}}, {90, 60, 33, 55, {34, 10, 50, 50}}};
+    for (size_t k = 0; k < sizeof all / sizeof all[0]; k++) {
+        for (int covered = 0; covered <= 1; covered++) {
+            for (int frames = 7; frames <= 8; frames++) {
+                scene s = make();
+                bst_camera camera = s.s.camera;
+                camera.width_px = all[k].width;
+                camera.height_px = all[k].height;
+                bst_discriminator_free(s.d);
+                bst_assert_ok(&s.ctx, bst_discriminator_create(&s.ctx, &camera, ROOM, &s.d));
+                const bst_window whole = {0, 0, all[k].width, all[k].height};
+                s.frame.oriented = false;
+                s.frame.window = whole;
+                next(&s, 0.0);
+                add(&s, all[k].x + 0.2, all[k].y - 0.3, 12, BST_LABEL_HIT);
+                label(&s);
+                for (int i = 0; i < frames; i++) {
+                    s.frame.window = covered ? whole : all[k].other;
+                    next(&s, 0.0);
+                    label(&s);
+                }
+                s.frame.window = whole;
+                next(&s, 0.0);
+                const bst_detection *d = add(&s, all[k].x - 0.4, all[k].y + 0.1, 12, BST_LABEL_HIT);
+                const bst_detection *beside =
+                    add(&s, all[k].x - 5.0, all[k].y - 4.0, 12, BST_LABEL_HIT);
+                label(&s);
+                bool forgotten = covered && frames == 8;
+                assert_int_equal(d->label, forgotten ? BST_LABEL_HIT : BST_LABEL_HOT_PIXEL);
+                assert_int_equal(beside->label, BST_LABEL_HIT);
+                end(&s);
+            }
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(hot_pixels_and_hits),
+        cmocka_unit_test(charge_outside_of_windows),
         cmocka_unit_test(suspected_pixels),
         cmocka_unit_test(stars_without_catalogue_and_objects),
         cmocka_unit_test(slow_object_leaves_its_place),

@@ -40,7 +40,7 @@ typedef struct look {
 static const bst_window whole = {0, 0, 90, 90};
 
 static const look looks[FRAMES] = {
-    {3.0, {0, 0}, {0, 0, 90, 90}, false, false},   {4.0, {0, 0}, {0, 0, 90, 90}, false, false},
+    {2.6, {0, 0}, {0, 0, 90, 90}, false, false},   {4.0, {0, 0}, {0, 0, 90, 90}, false, false},
     {4.5, {0, 0}, {0, 0, 90, 90}, false, false},   {6.2, {0, 26}, {0, 0, 90, 90}, false, false},
     {6.6, {0, 26}, {0, 0, 90, 90}, false, false},  {6.7, {0, 26}, {0, 0, 90, 90}, false, false},
     {8.0, {24, 26}, {0, 0, 90, 90}, true, false},  {8.9, {24, 26}, {0, 0, 90, 90}, false, true},

@@ -175,7 +175,8 @@ class Library:
                 unit = made + ".c"
                 with open(unit, "w", encoding="utf-8") as file:
                     file.write(together)
-            result = build_files.run([*self.tree.words_of(entry), "-O1", "-w", "-iquote", os.path.join(self.tree.folder, os.path.dirname(paths[0])),
+            result = build_files.run([*self.tree.words_of(entry), "-O1", "-w", "-Werror=implicit-function-declaration",
+                                      "-iquote", os.path.join(self.tree.folder, os.path.dirname(paths[0])),
                                       "-o", made, "-c", unit], cwd=entry["directory"])
             if result.returncode == 0:
                 return made

@@ -14,6 +14,7 @@ The log keeps what is done: a run that is ended goes on there. Tests labelled sl
 python) are left out. A bug outside of a function cannot be judged. Nothing in the tree or the build is changed.
 """
 import argparse
+import itertools
 import json
 import os
 import re
@@ -21,7 +22,7 @@ import shutil
 import sys
 import tempfile
 
-from every_function import FUNCTION, Function, Library, passes
+from every_function import FUNCTION, Function, Library, asks_for, passes
 from mutate import blank_comments, wilson
 from quick_tree import QuickTree
 
@@ -158,6 +159,13 @@ class Judge:
         half = len(bugs) // 2
         return self.among(command, seconds, bugs[:half]) + self.among(command, seconds, bugs[half:])
 
+    def rounds(self, numbers):
+        """Bugs that may act together: of each function one, since its first copy that acts hides the others."""
+        places = {}
+        for number in numbers:
+            places.setdefault(id(self.library.bugs[number][0]), []).append(number)
+        return [sorted(n for n in part if n) for part in itertools.zip_longest(*places.values())]
+
     def run(self, name, command, longest, together):
         """Runs a test without a bug, and with those that it enters and that are left."""
         if name in self.done or not self.alive():
@@ -175,7 +183,7 @@ class Judge:
         self.done[name] = {"sound": sound, "seconds": round(spent, 2), "entered": sorted(entered)}
         if sound:
             left = sorted(entered & self.alive())
-            for part in [left] if together else [[n] for n in left]:
+            for part in self.rounds(left) if together else [[n] for n in left]:
                 for number in self.among(command, spent, part):
                     self.noticed[number] = name
                     print(f"noticed {number} {self.library.bugs[number][1]['file']} by {name}", flush=True)

@@ -366,12 +366,86 @@ static void not_with_imm(void **state) {
     assert_non_null(strstr(ctx.message, "ekf"));
 }
 
+/* Inverse of a positive definite matrix by Gauss and Jordan. */
+static void inverse_of(const double from[4][4], double out[4][4]) {
+    double a[4][4];
+    memcpy(a, from, sizeof a);
+    for (int i = 0; i < 16; i++) {
+        out[i / 4][i % 4] = i / 4 == i % 4;
+    }
+    for (int p = 0; p < 4; p++) {
+        double pivot = a[p][p];
+        for (int k = 0; k < 4; k++) {
+            a[p][k] /= pivot;
+            out[p][k] /= pivot;
+        }
+        for (int i = 0; i < 4; i++) {
+            double f = a[i][p];
+            for (int k = 0; k < 4 && i != p; k++) {
+                a[i][k] -= f * a[p][k];
+                out[i][k] -= f * out[p][k];
+            }
+        }
+    }
+}
+
+/* Two estimates of one direction with other rates and slanting errors: the information of both adds
+ * up, and the mean is weighed by it, whichever comes first. */
+static void fused_by_information(void **state) {
+    (void)state;
+    const double unit[4] = {2e-6, 5e-6, 3e-7, 1e-7}; /* rad, rad/s */
+    bst_sky_state s[2] = {{.direction = bst_vec3_unit((bst_vec3){0.4, -0.7, 0.5})}};
+    double information[2][4][4], sum[4][4], expected[4][4], right[4] = {0}, x[4] = {0};
+    const bst_tangent axes = bst_tangent_at(s[0].direction);
+    s[1].direction = s[0].direction;
+    s[0].rate_radps = bst_tangent_vector(&axes, 4e-6, -3e-6);
+    s[1].rate_radps = bst_tangent_vector(&axes, 4.3e-6, -3.2e-6);
+    for (int n = 0; n < 2; n++) {
+        for (int i = 0; i < 16; i++) {
+            int a = i / 4, b = i % 4, swap = n ? 3 - abs(a - b) : abs(a - b);
+            double r = a == b ? 1.0 + 0.4 * n * a : 0.6 * cos(1.0 + 2.0 * swap + n) / (1 + swap);
+            s[n].covariance[a][b] = r * unit[a] * unit[b];
+        }
+        inverse_of((const double(*)[4])s[n].covariance, information[n]);
+    }
+    for (int i = 0; i < 16; i++) {
+        sum[i / 4][i % 4] = information[0][i / 4][i % 4] + information[1][i / 4][i % 4];
+    }
+    inverse_of((const double(*)[4])sum, expected);
+    for (int first = 0; first < 2; first++) {
+        bst_sky_state fused = s[first];
+        const double d[4] = {0.0, 0.0, first ? -0.3e-6 : 0.3e-6, first ? 0.2e-6 : -0.2e-6};
+        for (int i = 0; i < 4; i++) {
+            right[i] = x[i] = 0.0;
+            for (int k = 0; k < 4; k++) {
+                right[i] += information[1 - first][i][k] * d[k];
+            }
+        }
+        for (int i = 0; i < 16; i++) {
+            x[i / 4] += expected[i / 4][i % 4] * right[i % 4];
+        }
+        assert_true(bst_sky_fuse(&fused, &s[1 - first]));
+        bst_vec3 moved = bst_vec3_sub(fused.direction, s[first].direction);
+        bst_vec3 rate = bst_vec3_sub(fused.rate_radps, s[first].rate_radps);
+        /* to first order in angles of 1e-6 */
+        bst_assert_close(bst_vec3_dot(moved, axes.e1), x[0], 1e-4 * unit[0]);
+        bst_assert_close(bst_vec3_dot(moved, axes.e2), x[1], 1e-4 * unit[1]);
+        bst_assert_close(bst_vec3_dot(rate, axes.e1), x[2], 1e-4 * unit[2]);
+        bst_assert_close(bst_vec3_dot(rate, axes.e2), x[3], 1e-4 * unit[3]);
+        for (int i = 0; i < 16; i++) {
+            int a = i / 4, b = i % 4;
+            bst_assert_close(fused.covariance[a][b], expected[a][b], 1e-4 * unit[a] * unit[b]);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_gap_of_an_hour),
                                        cmocka_unit_test(low_orbits_are_oblate),
                                        cmocka_unit_test(identity_over_the_gap),
                                        cmocka_unit_test(not_with_imm),
                                        cmocka_unit_test(one_range),
+                                       cmocka_unit_test(fused_by_information),
                                        cmocka_unit_test(ranges_of_detections),
                                        cmocka_unit_test(ranges_with_errors_that_last)};
     return cmocka_run_group_tests(tests, NULL, NULL);
