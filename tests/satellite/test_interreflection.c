@@ -136,6 +136,31 @@ static void both_colours_are_in_the_light(void **state) {
     bst_test_model_close(&m);
 }
 
+/* A screen far above hides two fifths of the floor from the observer, and not from the Sun or the
+ * wall: so much less of its light arrives. The other way round, the Sun is hidden: the same. */
+static void a_screen_hides_the_second_surface(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_test_model m =
+        parts_of(CORNER
+                 ", {\"name\": \"screen\", \"kind\": \"plate\", \"position_m\": [0, 0.3, 9], "
+                 "\"size_m\": [1, 0.4, 1], \"material\": \"a\"}");
+    bst_interreflection *r;
+    bst_assert_ok(&ctx, bst_interreflection_create(&ctx, m.satellite, &r));
+    for (int k = 0; k < 2; k++) {
+        const bst_vec3 up = {0, 0, 1}, ahead = {0, 1, 0};
+        const bst_satellite_light light = {
+            .sun = k ? up : ahead, .observer = k ? ahead : up, .sunlit = 1};
+        bst_satellite_flux flux = {.error = 0};
+        bst_interreflection_add(r, m.pose, &light, &flux);
+        double want = 0.6 * 0.5 / BST_PI * 0.8 * 0.200044;
+        /* the form factor by points; the screen's lower side lights the floor by 1e-3 of that */
+        bst_assert_close(flux.sun[BST_SUNLIGHT_V], want, 5e-3 * want);
+    }
+    bst_interreflection_free(r);
+    bst_test_model_close(&m);
+}
+
 static void large_meshes_are_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -155,6 +180,7 @@ int main(void) {
         cmocka_unit_test(a_cavity_is_closed),
         cmocka_unit_test(light_goes_round_the_corner),
         cmocka_unit_test(both_colours_are_in_the_light),
+        cmocka_unit_test(a_screen_hides_the_second_surface),
         cmocka_unit_test(large_meshes_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
