@@ -143,12 +143,19 @@ static void offsets_change_from_frame_to_frame(void **state) {
     expose(f, 4, plain);
     bst_detector_pick_up_config *p = &f->camera.detector.pick_up;
     *p = (bst_detector_pick_up_config){40.0, 0.17, 0.31, 60.0};
-    f->camera.detector.offset_drift_dn_per_frame = 2.5;
+    f->camera.detector.offset_drift_dn_per_frame = -2.5; /* by itself: */
+    p->amplitude_e = 0.0;
+    make(f);
+    expose(f, 4, frame);
+    for (int i = 0; i < PIXELS; i++) {
+        bst_assert_close(frame[i], plain[i] - 4 * 2.5 * 0.5, 0.5 * 0.5 + 0.01);
+    }
+    p->amplitude_e = 40.0;
     make(f);
     expose(f, 4, frame);
     for (int i = 0; i < PIXELS; i++) {
         double turns = 60.0 / 360.0 + 0.17 * (i % SIDE) + 0.31 * (i / SIDE);
-        double want = plain[i] + 40.0 * sin(2.0 * BST_PI * turns) + 4 * 2.5 * 0.5;
+        double want = plain[i] + 40.0 * sin(2.0 * BST_PI * turns) - 4 * 2.5 * 0.5;
         /* rounding of both; floats of 1e5 DN */
         bst_assert_close(frame[i], want, 0.5 * 0.5 + 0.01);
     }
