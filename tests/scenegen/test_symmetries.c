@@ -209,13 +209,16 @@ static void turn_scene(way w, const scene *from, scene *to) {
 typedef struct picture {
     float image[WIDTH * HEIGHT];
     double peak_e[SOURCES];
+    bst_render_stats stats;
 } picture;
 
 static void take(fixture *f, const bst_camera *camera, const scene *s, bst_window window,
-                 int binning, picture *out) {
+                 int binning, int threads, picture *out) {
     bst_renderer *r;
+    bst_renderer_options options = bst_renderer_default_options();
+    options.planning_threads = threads;
     const bst_los_track track = {SAMPLES, (double *)s->time_s, (bst_quat *)s->q};
-    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, camera, NULL, &r));
+    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, camera, &options, &r));
     bst_render_request q = {.window = window,
                             .track = &track,
                             .sources = s->sources,
@@ -223,6 +226,7 @@ static void take(fixture *f, const bst_camera *camera, const scene *s, bst_windo
                             .background_e = 20.0,
                             .binning = binning};
     bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, out->image));
+    bst_renderer_get_stats(r, &out->stats);
     for (int i = 0; i < SOURCES; i++) {
         out->peak_e[i] = bst_renderer_peak_e(r, i);
     }
@@ -247,7 +251,7 @@ static void compare_ways(fixture *f, const bst_camera *camera, int binning) {
         bst_vec3 centre = turned(w, (bst_vec3){4.0, -7.0, 0.0});
         other.ghost.centre_x_px = bst_camera_centre_x(&c) + centre.x;
         other.ghost.centre_y_px = bst_camera_centre_y(&c) + centre.y;
-        take(f, &c, &other, turned_window(w, window), binning, n == 0 ? &want : &got);
+        take(f, &c, &other, turned_window(w, window), binning, 1, n == 0 ? &want : &got);
         double worst = 0.0, read2 = c.read_noise_e * c.read_noise_e;
         for (int i = 0; i < width * height && n > 0; i++) {
             double e = (double)want.image[i];
@@ -296,7 +300,7 @@ static void smaller_sensors_see_their_part(void **state) {
     bst_camera camera = odd_camera();
     bst_test_model model = bst_test_model_open(model_text);
     make_scene(&camera, model.satellite, &s);
-    take(f, &camera, &s, (bst_window){0, 0, WIDTH, HEIGHT}, 1, &whole);
+    take(f, &camera, &s, (bst_window){0, 0, WIDTH, HEIGHT}, 1, 1, &whole);
     const bst_window parts[] = {
         {118, 4, 27, 100}, {30, 3, 67, 60}, {46, 41, 90, 29}, {70, 0, 77, 23}, {115, 37, 20, 41}};
     for (int n = 0; n < 5; n++) {
@@ -308,7 +312,7 @@ static void smaller_sensors_see_their_part(void **state) {
         c.boresight_offset_px[1] = bst_camera_centre_y(&camera) - w->y0 - 0.5 * (w->height - 1);
         s.ghost.centre_x_px = bst_camera_centre_x(&c) + 4.0;
         s.ghost.centre_y_px = bst_camera_centre_y(&c) - 7.0;
-        take(f, &c, &s, (bst_window){0, 0, w->width, w->height}, 1, &part);
+        take(f, &c, &s, (bst_window){0, 0, w->width, w->height}, 1, 1, &part);
         double worst = 0.0;
         for (int i = 0; i < w->width * w->height; i++) {
             int at = (w->y0 + i / w->width) * WIDTH + w->x0 + i % w->width;
@@ -320,9 +324,33 @@ static void smaller_sensors_see_their_part(void **state) {
     bst_test_model_close(&model);
 }
 
+/* What several threads compute ahead is what one computes: of sources in the window and beside it.
+ */
+static void threads_plan_the_same(void **state) {
+    fixture *f = *state;
+    static scene s;
+    static picture one, many;
+    bst_camera camera = odd_camera();
+    bst_test_model model = bst_test_model_open(model_text);
+    make_scene(&camera, model.satellite, &s);
+    for (int n = 0; n < 3;
+         n++) { /* all; the target, its ghost and the planet left or below of it */
+        const bst_window w = {n == 1 ? 70 : 0, n == 2 ? 100 : 0, n == 1 ? 70 : WIDTH,
+                              n == 2 ? 10 : 90};
+        take(f, &camera, &s, w, 1, 1, &one);
+        take(f, &camera, &s, w, 1, 4, &many);
+        assert_memory_equal(one.image, many.image, sizeof(float) * (size_t)(w.width * w.height));
+        assert_memory_equal(one.peak_e, many.peak_e, sizeof one.peak_e);
+        assert_true(one.stats.predicted_sigma > 0.0);
+        bst_assert_close(many.stats.predicted_sigma, one.stats.predicted_sigma, 0.0);
+        assert_true(many.stats.nodes == one.stats.nodes);
+    }
+    bst_test_model_close(&model);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(gaussian_images_turn),
-                                       cmocka_unit_test(distorted_images_turn),
-                                       cmocka_unit_test(smaller_sensors_see_their_part)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(gaussian_images_turn), cmocka_unit_test(distorted_images_turn),
+        cmocka_unit_test(smaller_sensors_see_their_part), cmocka_unit_test(threads_plan_the_same)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
