@@ -92,6 +92,27 @@ static bst_scene_source_rate growing(void) {
                                    .light = {0.0, 0.15, 1.0}};
 }
 
+/* The body, which turns and passes; `a`: a pixel, rad. */
+static void make_body(double a, const bst_satellite *model, scene *s) {
+    s->body = (bst_scene_source_body){.satellite = model, .times = TURNS};
+    for (int k = 0; k < TURNS; k++) {
+        bst_quat turn = bst_quat_from_rotvec((bst_vec3){0.04 * k, -0.01 * k, 0.02 * k});
+        s->body.q_body_from_gcrf[k] =
+            bst_quat_conj(bst_quat_mul(turn, bst_quat_from_rotvec((bst_vec3){2.7, 0.4, 0.3})));
+    }
+    s->body.object_m[0] = s->body.object_m[1] = (bst_vec3){7e6, 1e6, -2e6};
+    s->body.sun_m = bst_vec3_scale(bst_vec3_unit((bst_vec3){0.5, -0.3, -0.8}), BST_AU_M);
+    s->body.gain[0].sun = 1e2 / (a * a);
+    s->body.gain[1].sun = 3e2 / (a * a);
+    s->sources[6] = s->sources[3];
+    s->sources[6].apparent_mid = bst_vec3_unit(s->path[1].place[2]);
+    s->sources[6].path = &s->path[1];
+    s->sources[6].rate = NULL;
+    s->sources[6].body = &s->body;
+    s->sources[6].body_u[1] = 1.0;
+    s->sources[6].electrons_per_s = 1e6;
+}
+
 /* Stars, a target that passes, grows brighter and casts a ghost, a planet, and a body that turns.
  */
 static void make_scene(const bst_camera *camera, const bst_satellite *model, scene *s) {
@@ -141,23 +162,7 @@ static void make_scene(const bst_camera *camera, const bst_satellite *model, sce
     s->sources[5].kind = BST_SOURCE_OBJECT;
     s->sources[5].range_m = 1e6;
     s->sources[5].shape = &s->shape;
-    s->body = (bst_scene_source_body){.satellite = model, .times = TURNS};
-    for (int k = 0; k < TURNS; k++) {
-        bst_quat turn = bst_quat_from_rotvec((bst_vec3){0.04 * k, -0.01 * k, 0.02 * k});
-        s->body.q_body_from_gcrf[k] =
-            bst_quat_conj(bst_quat_mul(turn, bst_quat_from_rotvec((bst_vec3){2.7, 0.4, 0.3})));
-    }
-    s->body.object_m[0] = s->body.object_m[1] = (bst_vec3){7e6, 1e6, -2e6};
-    s->body.sun_m = bst_vec3_scale(bst_vec3_unit((bst_vec3){0.5, -0.3, -0.8}), BST_AU_M);
-    s->body.gain[0].sun = 1e2 / (a * a);
-    s->body.gain[1].sun = 3e2 / (a * a);
-    s->sources[6] = target;
-    s->sources[6].apparent_mid = bst_vec3_unit(s->path[1].place[2]);
-    s->sources[6].path = &s->path[1];
-    s->sources[6].rate = NULL;
-    s->sources[6].body = &s->body;
-    s->sources[6].body_u[1] = 1.0;
-    s->sources[6].electrons_per_s = 1e6;
+    make_body(a, model, s);
 }
 
 /* A body that is the same behind its mirror y = 0; 1 m is 12 px at 1000 km. */
