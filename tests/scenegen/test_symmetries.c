@@ -2,6 +2,7 @@
  * is mirrored, and the light of each source is the same. All sizes, places and motions differ
  * between the axes. */
 #include "scenegen/renderer.h"
+#include "sim/optics/psf.h"
 #include "sim/world/scene/source_body.h"
 #include "tests/satellite/satellite_support.h"
 #include "tests/scenegen/device_fixture.h"
@@ -353,9 +354,82 @@ static void threads_plan_the_same(void **state) {
     bst_test_model_close(&model);
 }
 
+enum { COLUMNS = 3, ROWS = 2, WIDE = 45, HIGH = 37 };
+
+/* A PSF with a field of widths, or of an image with four samples to a pixel; both the other way. */
+static bst_psf *turned_psf(bst_ctx *ctx, way w, const bst_camera *camera, const double *fwhm_px,
+                           const float *image) {
+    bst_psf_field_node nodes[COLUMNS * ROWS] = {{.psf_fwhm_px = 0.0}};
+    static float samples[WIDE * HIGH];
+    bst_camera c = *camera;
+    bst_psf *psf;
+    for (int i = 0; i < COLUMNS * ROWS; i++) {
+        nodes[place_of(w, COLUMNS, ROWS, i % COLUMNS, i / COLUMNS)].psf_fwhm_px = fwhm_px[i];
+    }
+    for (int i = 0; i < WIDE * HIGH; i++) {
+        samples[place_of(w, WIDE, HIGH, i % WIDE, i / WIDE)] = image[i];
+    }
+    const bst_psf_samples sampled = {samples, w.swap ? HIGH : WIDE, w.swap ? WIDE : HIGH, 1, 4.0};
+    const bst_psf_inputs inputs = {.samples = c.optics.psf == BST_PSF_FILE ? &sampled : NULL};
+    if (c.optics.psf == BST_PSF_MOFFAT) {
+        c.optics.field_columns = w.swap ? ROWS : COLUMNS;
+        c.optics.field_rows = w.swap ? COLUMNS : ROWS;
+        c.optics.field = (bst_config_list){nodes, COLUMNS * ROWS};
+    }
+    bst_assert_ok(ctx, bst_psf_create_from(ctx, &c, &inputs, &psf));
+    return psf;
+}
+
+/* Stars at rest behind other PSFs: a Moffat function that is wider at one corner, and the image of
+ * a slanted bar that is off its middle. */
+static void images_of_other_psfs_turn(void **state) {
+    fixture *f = *state;
+    static const double fwhm_px[COLUMNS * ROWS] = {1.8, 2.0, 2.4, 1.9, 2.2, 3.0};
+    static float bar[WIDE * HIGH], images[2][WIDTH * HEIGHT];
+    const double stars[3][2] = {{33.3, 41.8}, {101.7, 84.2}, {122.4, 21.6}}, times[2] = {0.0, 0.6};
+    const bst_quat still[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
+    const bst_los_track track = {2, times, still};
+    for (int i = 0; i < WIDE * HIGH; i++) {
+        double x = (i % WIDE - 21.0) / 4.0, y = (double)(i / WIDE - 18) / 4.0;
+        double u = 0.8 * x + 0.6 * y, v = 0.8 * y - 0.6 * x;
+        bar[i] = (float)exp(-0.5 * (u * u / 0.6 + v * v / 1.1));
+    }
+    for (int n = 0; n < 4; n++) { /* two PSFs, each straight and turned by a quarter */
+        way w = way_of(n % 2 ? 5 : 0);
+        bst_camera first = odd_camera();
+        first.optics =
+            (bst_optics_config){.psf = n < 2 ? BST_PSF_MOFFAT : BST_PSF_FILE, .moffat_beta = 3.0};
+        bst_camera c = turned_camera(w, &first);
+        bst_psf *psf = turned_psf(&f->ctx, w, &c, fwhm_px, bar);
+        c.psf = psf;
+        bst_scene_source sources[3];
+        for (int i = 0; i < 3; i++) {
+            sources[i] = scene_star(&first, stars[i][0], stars[i][1], 3e4);
+            sources[i].apparent_mid = turned(w, sources[i].apparent_mid);
+        }
+        bst_renderer *r;
+        bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &c, NULL, &r));
+        bst_render_request q = {.window = {0, 0, (int)c.width_px, (int)c.height_px},
+                                .track = &track,
+                                .sources = sources,
+                                .count = 3};
+        bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, images[n % 2]));
+        double worst = 0.0;
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            int at = place_of(w, WIDTH, HEIGHT, i % WIDTH, i / WIDTH);
+            double want = (double)images[0][i], got = (double)images[n % 2][at];
+            worst = fmax(worst, fabs(got - want) / sqrt(want + c.read_noise_e * c.read_noise_e));
+        }
+        assert_true(worst < 0.02);
+        bst_renderer_free(r);
+        bst_psf_free(psf);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(gaussian_images_turn), cmocka_unit_test(distorted_images_turn),
-        cmocka_unit_test(smaller_sensors_see_their_part), cmocka_unit_test(threads_plan_the_same)};
+        cmocka_unit_test(smaller_sensors_see_their_part), cmocka_unit_test(threads_plan_the_same),
+        cmocka_unit_test(images_of_other_psfs_turn)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
