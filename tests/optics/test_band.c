@@ -303,6 +303,33 @@ static void tables_from_files(void **state) {
     }
 }
 
+/* Sunlight that was reddened linearly with the wavelength: as at the mean wavelength of its photons
+ * in the band; and of each interval of wavelengths by itself, the bands are within. */
+static void reddened_sunlight_is_that_of_the_wavelengths(void **state) {
+    (void)state;
+    const double *w = bst_sunlight_wavelength_m;
+    for (int k = 0; k + 1 < BST_SUNLIGHT_COLOURS; k++) {
+        double low_um = 1e6 * (w[k] + 0.1 * (w[k + 1] - w[k]));
+        double high_um = 1e6 * (w[k] + 0.4 * (w[k + 1] - w[k]));
+        bst_optics_response_point points[2] = {{low_um, 1.0}, {high_um, 0.4}};
+        bst_band *band = band_from(points, 2);
+        double light[BST_SUNLIGHT_COLOURS], photons = 0.0, mean_m = 0.0;
+        for (int n = 0; n < 4000; n++) {
+            double m = 1e-6 * (low_um + (high_um - low_um) * (n + 0.5) / 4000);
+            double part = bst_band_response(band, m) * bst_optics_sun_irradiance(m) * m;
+            photons += part;
+            mean_m += part * m;
+        }
+        mean_m /= photons;
+        for (int i = 0; i < BST_SUNLIGHT_COLOURS; i++) {
+            light[i] = 0.1 + 0.7e6 * w[i];
+        }
+        /* nodes of the coarse table of the Sun */
+        bst_assert_close(bst_band_reddened_sun(band, light), 0.1 + 0.7e6 * mean_m, 2e-3);
+        bst_band_free(band);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_integral_of_planck_is_the_series),
@@ -317,6 +344,7 @@ int main(void) {
         cmocka_unit_test(tables_are_multiplied),
         cmocka_unit_test(wrong_tables_are_refused),
         cmocka_unit_test(tables_from_files),
+        cmocka_unit_test(reddened_sunlight_is_that_of_the_wavelengths),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

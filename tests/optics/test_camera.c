@@ -356,6 +356,21 @@ static void field_about_a_boresight_off_the_centre(void **state) {
     }
 }
 
+/* A packet passes the rows below it, on the mean of all rows half of the others; the dark current
+ * of a row's time each, doubled once, and clock-induced charge. */
+static void read_out_gathers_the_rows(void **state) {
+    (void)state;
+    bst_camera c = {.width_px = 400, .height_px = 5, .dark_current_e_per_s = 3.0};
+    c.detector.dark_doubling_k = 6.0;
+    c.detector.reference_temperature_c = -20.0;
+    c.detector.temperature_c = -14.0;
+    c.detector.readout_s = 0.25;
+    c.detector.clock_induced_e = 0.7;
+    bst_assert_close(bst_camera_dark_e_per_s(&c), 6.0, 1e-12);
+    bst_assert_close(bst_camera_readout_e(&c), 6.0 * 0.25 * (0 + 1 + 2 + 3 + 4) / 25.0 + 0.7,
+                     1e-12);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_falls_off_from_the_boresight),
@@ -371,6 +386,7 @@ int main(void) {
         cmocka_unit_test(a_sphere_at_a_geostationary_distance),
         cmocka_unit_test(a_sphere_keeps_the_energy),
         cmocka_unit_test(no_light_is_infinitely_faint),
+        cmocka_unit_test(read_out_gathers_the_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

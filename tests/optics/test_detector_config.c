@@ -182,10 +182,41 @@ static void edges_leave_pixels(void **state) {
     assert_true(fits(&d, 7, 3));
 }
 
+/* What does not fit is named in the message. */
+static void edges_and_outputs_fit_the_frame(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_detector_config d = {.shielded = {60, 40, 0, 0}};
+    assert_int_equal(bst_detector_config_check_size(&ctx, &d, 100, 50), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "shielded: 100 columns and 0 rows leave nothing"));
+    d = (bst_detector_config){.overscan = {0, 0, 0, 50}};
+    assert_int_equal(bst_detector_config_check_size(&ctx, &d, 100, 50), BST_ERR_CONFIG);
+    d = (bst_detector_config){.shielded = {60, 0, 0, 0}, .overscan = {0, 40, 0, 0}};
+    assert_int_equal(bst_detector_config_check_size(&ctx, &d, 100, 50), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "shielded and overscan together: 100 columns"));
+    d.overscan.right = 39;
+    d.overscan.left = 60; /* the same columns */
+    bst_assert_ok(&ctx, bst_detector_config_check_size(&ctx, &d, 100, 50));
+    d = (bst_detector_config){.crosstalk = {3, 0.01, true}};
+    assert_int_equal(bst_detector_config_check_size(&ctx, &d, 100, 50), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "crosstalk/outputs: 3 outputs"));
+    bst_assert_ok(&ctx, bst_detector_config_check_size(&ctx, &d, 99, 50));
+    /* rows cannot be exposed one after the other and move charge */
+    d = (bst_detector_config){.row_time_s = 1e-4, .parallel_traps = {{1.0}, {1.0}, 0.5, 0.0}};
+    assert_int_equal(bst_detector_config_check(&ctx, &d), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "traps"));
+    d = (bst_detector_config){.serial_traps = {{1.0}, {1.0}, 0.5, 0.0},
+                              .crosstalk = {2, 0.0, true}};
+    assert_int_equal(bst_detector_config_check(&ctx, &d), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "serial_traps"));
+    d.crosstalk.outputs = 1;
+    bst_assert_ok(&ctx, bst_detector_config_check(&ctx, &d));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(dark_current_doubles), cmocka_unit_test(rows_lead),
+        cmocka_unit_test(dark_current_doubles),  cmocka_unit_test(rows_lead),
         cmocka_unit_test(effects_by_themselves), cmocka_unit_test(limits_of_settings),
-        cmocka_unit_test(edges_leave_pixels)};
+        cmocka_unit_test(edges_leave_pixels),    cmocka_unit_test(edges_and_outputs_fit_the_frame)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

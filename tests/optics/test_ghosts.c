@@ -108,6 +108,37 @@ static void factors_reflect_about_the_boresight(void **state) {
     bst_ghosts_free(g);
 }
 
+/* A table of 2 columns and 3 rows: a ghost within its bounds and outside_px, by a tenth of a pixel
+ * on each side; and one without a table within the sensor's. */
+static void ghosts_end_outside_their_bounds(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_ghost_config list[] = {{.intensity = 0.1, .factor = -1.0, .outside_px = 2.0}};
+    bst_camera camera = camera_with(list, 1);
+    bst_ghosts *made;
+    bst_assert_ok(&ctx, bst_ghosts_create(&ctx, &camera, "", &made));
+    bst_ghost table = {.intensity = 0.1, .outside_px = 2.0};
+    bst_assert_ok(&ctx, read(&ctx,
+                             "source_x_px,source_y_px,x_px,y_px,intensity\n10,5,1,1,1\n60,5,2,1,1\n"
+                             "10,20,1,2,1\n60,20,2,2,1\n10,75,1,3,1\n60,75,2,3,1\n",
+                             &table.map));
+    const bst_ghost *const ghosts[2] = {&made->items[0], &table};
+    const double bounds[2][4] = {{-0.5, 100.5, -0.5, 80.5}, {10.0, 60.0, 5.0, 75.0}};
+    for (int n = 0; n < 2; n++) {
+        const double *b = bounds[n];
+        for (int side = 0; side < 4; side++) {
+            for (int out = 0; out < 2; out++) {
+                double place[2] = {0.5 * (b[0] + b[1]), 0.5 * (b[2] + b[3])};
+                place[side / 2] = b[side] + (side % 2 ? 1.0 : -1.0) * (out ? 2.1 : 1.9);
+                double light = bst_ghost_intensity(ghosts[n], &camera, place[0], place[1]);
+                bst_assert_close(light, out ? 0.0 : 0.1, 1e-15);
+            }
+        }
+    }
+    bst_ghost_map_free(&table.map);
+    bst_ghosts_free(made);
+}
+
 static void bad_ghosts_are_named(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -132,6 +163,7 @@ int main(void) {
         cmocka_unit_test(bad_tables_are_named),
         cmocka_unit_test(factors_reflect_about_the_boresight),
         cmocka_unit_test(bad_ghosts_are_named),
+        cmocka_unit_test(ghosts_end_outside_their_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -274,6 +274,21 @@ static void the_sun_s_light_needs_no_mix(void **state) {
         bst_psf_otf(solar, 0, f, 0.2 * f, b);
         assert_true(a[0] == b[0] && a[1] == b[1]); /* the same sums */
     }
+    /* the centroid of a mix is that of its parts */
+    const float mixes[BST_PSF_SPECTRA + 1][BST_PSF_COLOURS] = {
+        {0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3F, 0.2F, 0.1F}};
+    double place[BST_PSF_SPECTRA + 1][2], alone[2];
+    bst_psf_centroid_px(solar, mixes[0], 50, 25, alone);
+    assert_true(hypot(alone[0], alone[1]) > 0.01); /* coma */
+    for (int s = 0; s <= BST_PSF_SPECTRA; s++) {
+        bst_psf_centroid_px(sources, mixes[s], 50, 25, place[s]);
+    }
+    for (int a = 0; a < 2; a++) {
+        bst_assert_close(place[0][a], alone[a], 1e-12);
+        bst_assert_close(
+            place[4][a],
+            0.4 * place[0][a] + 0.3 * place[1][a] + 0.2 * place[2][a] + 0.1 * place[3][a], 1e-7);
+    }
     float colour[BST_PSF_COLOURS];
     bst_psf_colour(sources, 5772.0, colour);
     for (int s = 0; s < BST_PSF_COLOURS; s++) {

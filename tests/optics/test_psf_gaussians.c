@@ -60,9 +60,44 @@ static void agrees_with_the_integral_over_frequencies(void **state) {
     }
 }
 
+/* Between the nodes of a field of unequal Gaussians: the square of their mixed image, pairs of
+ * which have the closed form 1 / (2 pi (s^2 + t^2)). */
+static void nodes_of_a_field_mix(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double fwhm_px[6] = {3.0, 5.0, 4.0, 8.0, 6.0, 3.5};
+    bst_psf_field_node nodes[6] = {{.psf_fwhm_px = 0.0}};
+    for (int i = 0; i < 6; i++) {
+        nodes[i].psf_fwhm_px = fwhm_px[i];
+    }
+    bst_camera camera = {
+        .width_px = 201, .height_px = 101, .pixel_scale_arcsec = 2.0, .aperture_m = 0.1};
+    camera.psf_fwhm_px = 4.0;
+    camera.optics.field_columns = 3;
+    camera.optics.field_rows = 2;
+    camera.optics.field = (bst_config_list){nodes, 6};
+    bst_psf *psf;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    const float sun[BST_PSF_COLOURS] = {0.0F};
+    /* at a quarter of the right cells and 0.3 of the rows: nodes 1, 2, 4, 5 */
+    const int at[4] = {1, 2, 4, 5};
+    const double share[4] = {0.75 * 0.7, 0.25 * 0.7, 0.75 * 0.3, 0.25 * 0.3};
+    double want = 0.0;
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 4; k++) {
+            double s = fwhm_px[at[i]] / BST_FWHM_PER_SIGMA, t = fwhm_px[at[k]] / BST_FWHM_PER_SIGMA;
+            want += share[i] * share[k] / (2.0 * BST_PI * (s * s + t * t));
+        }
+    }
+    double got = bst_psf_squared_image(psf, sun, 125.0, 30.0, 0.0, 0.0, 0.0);
+    bst_assert_close(got, want, 0.03 * want); /* as above; pixels add 1 / 12 px^2 */
+    bst_psf_free(psf);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(agrees_with_the_integral_over_frequencies),
+        cmocka_unit_test(nodes_of_a_field_mix),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -258,6 +258,27 @@ static void noise_areas_have_closed_forms(void **state) {
     bst_psf_free(psf);
 }
 
+/* Jitter in rad at another pixel scale: so many of its pixels, as a Gaussian of that width. */
+static void jitter_in_angles_is_of_the_new_pixels(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = camera_of(BST_PSF_GAUSSIAN), out;
+    bst_psf *psf;
+    double sigma_rad = 1.2 * BST_ARCSEC_RAD;
+    bst_assert_ok(&ctx,
+                  bst_psf_camera_trembling(&ctx, &camera, 3.0, sigma_rad * sigma_rad, &out, &psf));
+    double h[2], own = 2.0 / BST_FWHM_PER_SIGMA, variance = own * own + 0.4 * 0.4;
+    bst_assert_close(out.pixel_scale_arcsec, 3.0, 0.0);
+    bst_assert_close(out.optics.diffusion_px, 0.4, 1e-12);
+    bst_psf_otf(psf, 0, 0.11, -0.07, h);
+    double f2 = 0.11 * 0.11 + 0.07 * 0.07;
+    bst_assert_close(h[0], sinc(0.11) * sinc(0.07) * exp(-2.0 * BST_PI * BST_PI * variance * f2),
+                     1e-6);
+    bst_psf_free(psf);
+    bst_assert_ok(&ctx, bst_psf_camera_trembling(&ctx, &camera, 3.0, 0.0, &out, &psf));
+    assert_null(psf);
+}
+
 static void a_camera_lends_its_psf(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -379,6 +400,7 @@ int main(void) {
         cmocka_unit_test(field_nodes_mix_bilinearly),
         cmocka_unit_test(noise_areas_have_closed_forms),
         cmocka_unit_test(a_camera_lends_its_psf),
+        cmocka_unit_test(jitter_in_angles_is_of_the_new_pixels),
         cmocka_unit_test(no_light_is_lost),
         cmocka_unit_test(jitter_widens_any_psf),
     };

@@ -322,6 +322,44 @@ static void rates_of_the_laws(void **state) {
     bst_body_attitude_free(a);
 }
 
+/* A steady torque about one body axis, from rest: half of torque over its own moment, times the
+ * time squared. */
+static bool steady(void *user, const bst_attitude_config *phase, double seconds, bst_quat q,
+                   bst_vec3 *torque_nm) {
+    (void)seconds;
+    (void)q;
+    assert_true(phase->torques.drag);
+    *torque_nm = *(const bst_vec3 *)user;
+    return true;
+}
+
+static void torques_turn_by_their_own_moment(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_vec3 torques[3] = {{0.02, 0, 0}, {0, -0.03, 0}, {0, 0, 0.04}};
+    for (int axis = 0; axis < 3; axis++) {
+        bst_attitude_config c = {.from_s = 10,
+                                 .law = BST_ATTITUDE_TUMBLE,
+                                 .quaternion = {0, 0, 0, 1},
+                                 .inertia_kg_m2 = {100, 250, 300},
+                                 .torques = {.drag = true, .tolerance_rad = 1e-4}};
+        bst_vec3 torque = torques[axis];
+        bst_config_list list = {&c, 1};
+        bst_body_attitude *a;
+        bst_assert_ok(&ctx, bst_body_attitude_create(&ctx, &list, &from, &a));
+        assert_true(bst_body_attitude_has_torques(a));
+        bst_assert_ok(&ctx, bst_body_attitude_set_torque(&ctx, a, steady, &torque));
+        bst_attitude_state s = {{7e6, 1e5, -2e5}, {-100, 7000, 2000}, {0.36, 0.48, 0.8}, 10 + 60};
+        bst_vec3 turn = bst_quat_to_rotvec(bst_body_attitude_at(a, &s));
+        const double got[3] = {turn.x, turn.y, turn.z}, moment[3] = {torque.x, torque.y, torque.z};
+        for (int k = 0; k < 3; k++) {
+            /* a rotation of coordinates: against that of the body; tolerance of a day */
+            bst_assert_close(fabs(got[k]), fabs(0.5 * moment[k] / inertia[k] * 60 * 60), 1e-4);
+        }
+        bst_body_attitude_free(a);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tumbling_keeps_energy_and_momentum),
@@ -334,6 +372,7 @@ int main(void) {
         cmocka_unit_test(rows_ascend_and_are_unit_quaternions),
         cmocka_unit_test(commands_hold_until_the_next),
         cmocka_unit_test(rates_of_the_laws),
+        cmocka_unit_test(torques_turn_by_their_own_moment),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

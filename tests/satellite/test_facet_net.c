@@ -44,7 +44,27 @@ static void a_plate_crosses_a_round_end(void **state) {
     }
 }
 
+/* Sizes of facets are their diagonals, whichever corners they connect. */
+static void facets_have_the_size_of_their_diagonal(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_test_model m = bst_test_model_open(
+        "{\"materials\": [{\"name\": \"a\", \"diffuse\": 0.5}], \"parts\": [{\"name\": \"b\", "
+        "\"kind\": \"box\", \"size_m\": [1, 2, 4], \"material\": \"a\"}]}");
+    bst_facet_net net;
+    bst_assert_ok(&ctx, bst_facet_net_make(&ctx, m.satellite, &net));
+    assert_int_equal(m.satellite->facet_count, 6);
+    for (int f = 0; f < 6; f++) {
+        bst_vec3 n = m.satellite->facets[f].normal;
+        double want = fabs(n.x) > 0.5 ? sqrt(20) : fabs(n.y) > 0.5 ? sqrt(17) : sqrt(5);
+        bst_assert_close((double)net.size_m[f], want, 1e-6);
+    }
+    bst_facet_net_free(&net);
+    bst_test_model_close(&m);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_plate_crosses_a_round_end)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_plate_crosses_a_round_end),
+                                       cmocka_unit_test(facets_have_the_size_of_their_diagonal)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

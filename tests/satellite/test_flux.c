@@ -470,6 +470,48 @@ static void what_is_seen_emits(void **state) {
     bst_test_model_close(&m);
 }
 
+/* A thin round end that is tilted by 53 degrees to either side of two axes, and a plate that hides
+ * the last fifth of its width: a segment of an ellipse. */
+static void a_plate_hides_the_fringe_of_a_disc(void **state) {
+    (void)state;
+    const double tilt = acos(0.6);
+    for (int k = 0; k < 4; k++) {
+        double a = k % 2 ? -tilt : tilt, lost[2] = {0.0};
+        for (int side = -1; side <= 1; side += 2) {
+            double flux[2];
+            /* axes of the image: across the tilt, and along it; the body turns about y, or about x
+             */
+            bst_vec3 way = k < 2 ? (bst_vec3){sin(a), 0, cos(a)} : (bst_vec3){0, -sin(a), cos(a)};
+            bst_vec3 across =
+                k < 2 ? (bst_vec3){cos(a), 0, -sin(a)} : (bst_vec3){0, cos(a), sin(a)};
+            /* its middle is 0.5 m beyond what it hides first */
+            bst_vec3 at = bst_vec3_axpy(bst_vec3_scale(way, 5), side * (0.6 * 0.8 + 0.5), across);
+            for (int n = 0; n < 2; n++) {
+                char text[700];
+                snprintf(
+                    text, sizeof text,
+                    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 0.5}, {\"name\": \"k\", "
+                    "\"diffuse\": 0}], \"parts\": [{\"name\": \"d\", \"kind\": \"cylinder\", "
+                    "\"radius_m\": 1, \"length_m\": 1e-4, \"segments\": 96, \"material\": \"m\"}, "
+                    "{\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [%d, %d, 0], "
+                    "\"position_m\": [%.12g, %.12g, %.12g], \"rotation_deg\": [%.12g, %.12g, 0], "
+                    "\"material\": \"k\"}]}",
+                    k < 2 ? 1 : 4, k < 2 ? 4 : 1, n ? at.x : 50 * across.x,
+                    n ? at.y : 50 * across.y, n ? at.z : 50 * across.z,
+                    k < 2 ? 0.0 : a / BST_DEG_RAD, k < 2 ? a / BST_DEG_RAD : 0.0);
+                bst_test_model m = bst_test_model_open(text);
+                flux[n] = bst_test_flux(&m, way, way);
+                bst_test_model_close(&m);
+            }
+            lost[side > 0] = 1.0 - flux[1] / flux[0];
+        }
+        double want = (acos(0.8) - 0.8 * 0.6) / BST_PI; /* of a circle, beyond 0.8 of its radius */
+        for (int side = 0; side < 2; side++) {
+            bst_assert_close(lost[side], want, 0.02 * want); /* the tolerance of a surface */
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_seen_emits),
@@ -487,6 +529,7 @@ int main(void) {
         cmocka_unit_test(penumbrae_leave_the_light),
         cmocka_unit_test(earthlight_has_its_closed_form),
         cmocka_unit_test(a_plate_in_a_dish),
+        cmocka_unit_test(a_plate_hides_the_fringe_of_a_disc),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -136,6 +136,68 @@ static void both_colours_are_in_the_light(void **state) {
     bst_test_model_close(&m);
 }
 
+/* Howell C-14: from a rectangle to one at a right angle; their common edge has the length 1. */
+static double at_right_angles(double w, double h) {
+    double w2 = w * w, h2 = h * h, s = w2 + h2;
+    double part = (1 + w2) * (1 + h2) / (1 + s);
+    part *= pow(w2 * (1 + s) / ((1 + w2) * s), w2) * pow(h2 * (1 + s) / ((1 + h2) * s), h2);
+    return (w * atan(1 / w) + h * atan(1 / h) - sqrt(s) * atan(1 / sqrt(s)) + 0.25 * log(part)) /
+           (BST_PI * w);
+}
+
+/* A floor that is deeper than the wall is high, in slanted light and seen at a slant: what a wall
+ * gets goes with the cosine to the Sun, what is seen of the floor with that to the observer; and
+ * the other way round. */
+static void unequal_surfaces_in_slanted_light(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_assert_close(at_right_angles(1, 1), 0.200044, 1e-6);
+    bst_test_model m = parts_of(
+        "{\"name\": \"floor\", \"kind\": \"plate\", \"position_m\": [0, 0.8, 0], \"size_m\": [1, "
+        "1.6, 1], \"material\": \"a\"}, {\"name\": \"wall\", \"kind\": \"plate\", \"position_m\": "
+        "[0, 0, 0.35], \"rotation_deg\": [-90, 0, 0], \"size_m\": [1, 0.7, 1], \"material\": "
+        "\"b\"}");
+    bst_interreflection *r;
+    bst_assert_ok(&ctx, bst_interreflection_create(&ctx, m.satellite, &r));
+    for (int k = 0; k < 2; k++) {
+        /* along the other surface, which has no light of its own and is not seen */
+        const bst_vec3 to_wall = {0.6, 0.8, 0}, to_floor = {-0.5, 0, sqrt(0.75)};
+        const bst_satellite_light light = {
+            .sun = k ? to_floor : to_wall, .observer = k ? to_wall : to_floor, .sunlit = 1};
+        bst_satellite_flux flux = {.error = 0};
+        bst_interreflection_add(r, m.pose, &light, &flux);
+        double want = 0.8 * sqrt(0.75) / BST_PI * 0.5 * 0.8 * 1.6 * at_right_angles(1.6, 0.7);
+        bst_assert_close(flux.sun[BST_SUNLIGHT_V], want, 5e-3 * want); /* the factor by points */
+    }
+    bst_interreflection_free(r);
+    bst_test_model_close(&m);
+}
+
+/* A screen far above hides two fifths of the floor from the observer, and not from the Sun or the
+ * wall: so much less of its light arrives. The other way round, the Sun is hidden: the same. */
+static void a_screen_hides_the_second_surface(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_test_model m =
+        parts_of(CORNER
+                 ", {\"name\": \"screen\", \"kind\": \"plate\", \"position_m\": [0, 0.3, 9], "
+                 "\"size_m\": [1, 0.4, 1], \"material\": \"a\"}");
+    bst_interreflection *r;
+    bst_assert_ok(&ctx, bst_interreflection_create(&ctx, m.satellite, &r));
+    for (int k = 0; k < 2; k++) {
+        const bst_vec3 up = {0, 0, 1}, ahead = {0, 1, 0};
+        const bst_satellite_light light = {
+            .sun = k ? up : ahead, .observer = k ? ahead : up, .sunlit = 1};
+        bst_satellite_flux flux = {.error = 0};
+        bst_interreflection_add(r, m.pose, &light, &flux);
+        double want = 0.6 * 0.5 / BST_PI * 0.8 * 0.200044;
+        /* the form factor by points; the screen's lower side lights the floor by 1e-3 of that */
+        bst_assert_close(flux.sun[BST_SUNLIGHT_V], want, 5e-3 * want);
+    }
+    bst_interreflection_free(r);
+    bst_test_model_close(&m);
+}
+
 static void large_meshes_are_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -155,6 +217,8 @@ int main(void) {
         cmocka_unit_test(a_cavity_is_closed),
         cmocka_unit_test(light_goes_round_the_corner),
         cmocka_unit_test(both_colours_are_in_the_light),
+        cmocka_unit_test(unequal_surfaces_in_slanted_light),
+        cmocka_unit_test(a_screen_hides_the_second_surface),
         cmocka_unit_test(large_meshes_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

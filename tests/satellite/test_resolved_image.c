@@ -160,19 +160,14 @@ static const char *const chain =
 
 /* The light of a pose as sums over edges is that of bst_resolved_add, with its moments, also in
  * parts: of poses, and of a box that the body is partly outside of. */
-static void test_light(void **state) {
-    (void)state;
+static void compare_light(const bst_earthlight *earth) {
     bst_ctx ctx = {0};
     bst_test_model m = bst_test_model_open(chain);
     bst_resolved *r[3];
-    bst_resolved_gain gain[2] = {{.sun = 1.0, .earth = 1.0}, {.sun = 1.0, .earth = 2.0}};
-    bst_earthlight earth = {.count = 2,
-                            .direction = {bst_vec3_unit((bst_vec3){-0.6, 0.5, 0.7}),
-                                          bst_vec3_unit((bst_vec3){-0.5, 0.5, 0.9})},
-                            .irradiance = {0.3, 0.2},
-                            .centre = bst_vec3_unit((bst_vec3){-0.55, 0.5, 0.8})};
+    bst_resolved_gain gain[2] = {{.sun = 1.0, .earth = 1.0, .emission = 0.03},
+                                 {.sun = 1.0, .earth = 2.0, .emission = 0.05}};
     bst_resolved_light light = {
-        .sun = bst_vec3_unit((bst_vec3){0.7, 0.9, 0.4}), .earthlight = &earth, .gain = gain};
+        .sun = bst_vec3_unit((bst_vec3){0.7, 0.9, 0.4}), .earthlight = earth, .gain = gain};
     bst_resolved_view view = look_from((bst_vec3){0.2, 0.7, 0.9}, (bst_vec3){1, 0, 0}, 40.0, 0.004);
     double low[2], high[2], brightest = 0.0, worst = 0.0;
     assert_true(bst_resolved_may_add_light(m.satellite));
@@ -208,6 +203,17 @@ static void test_light(void **state) {
         bst_resolved_free(r[n]);
     }
     bst_test_model_close(&m);
+}
+
+static void test_light(void **state) {
+    (void)state;
+    bst_earthlight earth = {.count = 2,
+                            .direction = {bst_vec3_unit((bst_vec3){-0.6, 0.5, 0.7}),
+                                          bst_vec3_unit((bst_vec3){-0.5, 0.5, 0.9})},
+                            .irradiance = {0.3, 0.2},
+                            .centre = bst_vec3_unit((bst_vec3){-0.55, 0.5, 0.8})};
+    compare_light(&earth);
+    compare_light(NULL); /* sunlight and emission of a facet are even over it */
 }
 
 /* Second moments are those of cells of a sixteenth of the side. */

@@ -159,6 +159,53 @@ static void a_plate_off_centre_has_its_torque(void **state) {
     bst_test_model_close(&m);
 }
 
+/* In an orbit, on a body that is turned: a plate whose normal is 25 degrees above the direction
+ * that its joint turns to the Earth, the Sun or the observer, for whom the Earth stands. Its areas
+ * are those of its normal. */
+static void parts_aim_in_an_orbit(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    static const char *const follows[] = {"earth", "sun", "target"};
+    const bst_quat q = {0.1, -0.5, 0.7, 0.5};
+    bst_attitude_config phase = {
+        .from_s = -1e9, .law = BST_ATTITUDE_INERTIAL, .quaternion = {0.1, -0.5, 0.7, 0.5}};
+    const bst_config_list list = {&phase, 1};
+    const bst_attitude_source none = {.base_dir = ""};
+    bst_body_attitude *attitude;
+    bst_assert_ok(&ctx, bst_body_attitude_create(&ctx, &list, &none, &attitude));
+    const bst_force_state at = {.position_m = {4e6, -5e6, 2.5e6},
+                                .velocity_mps = {5000, 3000, -4000},
+                                .sun = bst_vec3_unit((bst_vec3){-0.3, 0.7, 0.5})};
+    const bst_vec3 ahead = bst_vec3_unit(at.velocity_mps);
+    for (int k = 0; k < 3; k++) {
+        char text[900];
+        snprintf(text, sizeof text,
+                 "{" GREY
+                 ", \"joints\": [{\"name\": \"j\", \"follows\": \"%s\", "
+                 "\"axis\": [0, 0, 1], \"normal\": [1, 0, 0]}], \"parts\": [{\"name\": "
+                 "\"p\", \"kind\": \"plate\", \"size_m\": [2, 3, 1], \"rotation_deg\": [0, 65, "
+                 "0], \"joint\": \"j\", \"material\": \"b\"}]}",
+                 follows[k]);
+        bst_test_model m = bst_test_model_open(text);
+        bst_satellite_make_surfaces(m.satellite);
+        bst_shape_forces *forces;
+        bst_assert_ok(&ctx, bst_shape_forces_create(&ctx, m.satellite, attitude, NULL, 0, &forces));
+        const bst_force_surface *surface = bst_shape_forces_surface(forces);
+        bst_vec3 to = bst_quat_rotate(q, k == 1 ? at.sun : bst_vec3_scale(at.position_m, -1.0));
+        double along = hypot(to.x, to.y), c = cos(25 * BST_DEG_RAD), s = sin(25 * BST_DEG_RAD);
+        bst_vec3 normal =
+            bst_quat_rotate(bst_quat_conj(q), (bst_vec3){c * to.x / along, c * to.y / along, s});
+        double area_m2 = surface->drag_area_m2(surface->user, &at, ahead);
+        bst_assert_close(area_m2, 6 * fabs(bst_vec3_dot(normal, ahead)), 1e-9);
+        bst_vec3 light_m2 = surface->light_area_m2(surface->user, &at); /* black: along the light */
+        double in = fabs(bst_vec3_dot(normal, at.sun));
+        bst_assert_close(bst_vec3_norm(bst_vec3_axpy(light_m2, 6 * in, at.sun)), 0, 1e-9);
+        bst_shape_forces_free(forces);
+        bst_test_model_close(&m);
+    }
+    bst_body_attitude_free(attitude);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sphere_has_its_coefficient),
@@ -167,6 +214,7 @@ int main(void) {
         cmocka_unit_test(parts_shadow_each_other),
         cmocka_unit_test(loads_have_their_lever),
         cmocka_unit_test(a_plate_off_centre_has_its_torque),
+        cmocka_unit_test(parts_aim_in_an_orbit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

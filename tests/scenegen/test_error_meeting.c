@@ -1,5 +1,6 @@
 /* Predicted errors by where paths meet, against those of the budget, which knows boxes only. Paths
  * are an arc of a quarter turn; no device. */
+#include "boresight/vec.h"
 #include "scenegen/smear/error_meeting.h"
 #include "tests/test_support.h"
 
@@ -122,12 +123,81 @@ static void a_node_behind_the_camera_meets_all(void **state) {
                      bst_error_budget_error_sigma(f->budget), 1e-6);
 }
 
+/* Least distance of the nodes of two sources: a roll, and a shift along y that grows with it. */
+static double gap_px(const bst_error_budget_source *a, int a_nodes,
+                     const bst_error_budget_source *b, int b_nodes, double shift_px) {
+    double least = INFINITY;
+    for (int i = 0; i < a_nodes; i++) {
+        for (int k = 0; k < b_nodes; k++) {
+            double u = (double)i / (NODES - 1), v = (double)k / (NODES - 1);
+            double c = cos(0.5 * BST_PI * u), s = sin(0.5 * BST_PI * u);
+            double d = cos(0.5 * BST_PI * v), t = sin(0.5 * BST_PI * v);
+            double x = c * (double)a->x_px - s * (double)a->y_px - d * (double)b->x_px +
+                       t * (double)b->y_px;
+            double y = s * (double)a->x_px + c * (double)a->y_px + shift_px * u -
+                       t * (double)b->x_px - d * (double)b->y_px - shift_px * v;
+            least = fmin(least, hypot(x, y));
+        }
+    }
+    return least;
+}
+
+/* Sources of unequal numbers of blocks on paths that are no circles, whose places differ along both
+ * axes: those near each other add in whole, others do not, by all pairs of their nodes. */
+static void paths_meet_by_their_nodes(void **state) {
+    fixture *f = *state;
+    const double shift_px = 50.0;
+    const float places[][2][2] = {{{40.0F, 0.0F}, {20.0F, -34.6F}},
+                                  {{40.0F, 0.0F}, {34.0F, 21.0F}},
+                                  {{40.0F, 0.0F}, {36.0F, -60.0F}},
+                                  {{-25.0F, 30.0F}, {10.0F, 62.0F}}};
+    int near = 0, far = 0;
+    for (int n = 0; n < NODES; n++) {
+        f->table[n / BST_BLOCK * BST_TABLE_ROWS * BST_BLOCK + n % BST_BLOCK + 5 * BST_BLOCK] =
+            (float)(shift_px * n / (NODES - 1));
+    }
+    for (int c = 0; c < 8; c++) {
+        bst_error_budget_source s[2];
+        const int blocks[2] = {c % 2 ? 1 : BLOCKS, c % 2 ? BLOCKS : 1};
+        const bst_error_budget_motion motion = {.direction = {1.0, 0.0},
+                                                .length_px = 90.0,
+                                                .width_px = 90.0,
+                                                .way_px = 100.0,
+                                                .sigma_px = SIGMA_PX,
+                                                .dark_variance_e2 = DARK_E * DARK_E};
+        bst_error_budget_begin(f->budget, &motion);
+        for (int i = 0; i < 2; i++) {
+            double error_e = DARK_E * (i ? 0.4 : 0.5);
+            s[i] = (bst_error_budget_source){.x_px = places[c / 2][i][0],
+                                             .y_px = places[c / 2][i][1],
+                                             .nodes_e = (float)error_e,
+                                             .predicted_e = (float)error_e};
+            f->sources[i] = (bst_kernel_source_record){
+                .x_px = s[i].x_px, .y_px = s[i].y_px, .blocks = blocks[i]};
+            bst_assert_ok(&f->ctx, bst_error_budget_add(&f->ctx, f->budget, &s[i]));
+        }
+        double gap = gap_px(&s[0], blocks[0] * BST_BLOCK, &s[1], blocks[1] * BST_BLOCK, shift_px);
+        double sigma = bst_error_meeting_sigma(&f->meeting, f->budget, &f->paths);
+        bst_error_meeting_free(f->meeting);
+        f->meeting = NULL;
+        if (gap < 3.0) { /* within 3 sigma */
+            bst_assert_close(sigma, 0.5 + 0.4 * 0.4, 1e-3);
+        } else if (gap > 8.0) {
+            assert_true(sigma < 0.6);
+        }
+        near += gap < 3.0;
+        far += gap > 8.0;
+    }
+    assert_true(near >= 2 && far >= 2);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(arcs_side_by_side_do_not_add, setup, teardown),
         cmocka_unit_test_setup_teardown(noise_is_that_of_the_place, setup, teardown),
         cmocka_unit_test_setup_teardown(near_arcs_add, setup, teardown),
         cmocka_unit_test_setup_teardown(grid_errors_add_anywhere, setup, teardown),
+        cmocka_unit_test_setup_teardown(paths_meet_by_their_nodes, setup, teardown),
         cmocka_unit_test_setup_teardown(a_node_behind_the_camera_meets_all, setup, teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
