@@ -97,6 +97,52 @@ static void test_default_margins(void **state) {
     }
 }
 
+/* The controller's own steps at an error that swings, with the mean rate since a time before, and
+ * its torques held: their part at that frequency. The gyroscope is faster than the controller, or
+ * slower. */
+static void test_controller_by_its_steps(void **state) {
+    (void)state;
+    enum { STEPS = 4000 };
+    static const double gyro_hz[] = {50.0, 4.0};
+    for (int i = 0; i < 12; i++) {
+        const int axis = i % 3, cycles = i < 6 ? 40 : 330;
+        bst_spacecraft_config c = config_make(BST_LAW_INERTIAL);
+        c.attitude.rate_hz = 10.0;
+        c.attitude.bandwidth_hz = 0.05;
+        c.attitude.integral_hz = 0.02;
+        c.gyro.rate_hz = gyro_hz[i / 3 % 2];
+        const double dt = 0.1, rate_s = fmax(dt, 1.0 / c.gyro.rate_hz), tiny = 1e-7;
+        const double hz = cycles / (STEPS * dt), w = 2.0 * BST_PI * hz;
+        bst_spacecraft_attitude_control control;
+        const bst_spacecraft_attitude_control_spec spec = bst_spacecraft_attitude_control_of(&c);
+        bst_spacecraft_attitude_control_init(&control, &spec);
+        const bst_spacecraft_attitude_reference still = {.q_body_from_gcrf = BST_QUAT_IDENTITY};
+        double re = 0.0, im = 0.0;
+        for (int n = 0; n < STEPS; n++) {
+            const double t = n * dt, e = tiny * cos(w * t);
+            const double rate = (e - tiny * cos(w * (t - rate_s))) / rate_s;
+            bst_vec3 turn = {0, 0, 0}, spin = turn;
+            *(axis == 0 ? &turn.x : axis == 1 ? &turn.y : &turn.z) = e;
+            *(axis == 0 ? &spin.x : axis == 1 ? &spin.y : &spin.z) = rate;
+            const bst_vec3 torque = bst_spacecraft_attitude_control_step(
+                &control, &still, bst_quat_turn_frame(BST_QUAT_IDENTITY, turn), spin,
+                (bst_vec3){0, 0, 0}, false);
+            const double about = axis == 0 ? torque.x : axis == 1 ? torque.y : torque.z;
+            re += -about / tiny * cos(w * t) * 2.0 / STEPS;
+            im -= -about / tiny * sin(w * t) * 2.0 / STEPS;
+        }
+        /* held for a step: sin(w dt / 2) / (w dt / 2), later by half of it */
+        const double half = 0.5 * w * dt, held = sin(half) / half;
+        const double x = held * (re * cos(half) + im * sin(half));
+        const double y = held * (im * cos(half) - re * sin(half));
+        const bst_spacecraft_response r = bst_spacecraft_response_at(&c, axis, hz);
+        const double size = hypot(x, y);
+        /* the torque's products of rates, and the rotation vector's cube */
+        bst_assert_close(r.controller[0], x, 1e-5 * size);
+        bst_assert_close(r.controller[1], y, 1e-5 * size);
+    }
+}
+
 /* RMS of pointing and knowledge against the integral of their spectra. */
 static void test_predicted_rms(void **state) {
     (void)state;
@@ -190,7 +236,8 @@ static void test_imbalance(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_margin_in_the_loop), cmocka_unit_test(test_default_margins),
-        cmocka_unit_test(test_predicted_rms), cmocka_unit_test(test_imbalance)};
+        cmocka_unit_test(test_margin_in_the_loop), cmocka_unit_test(test_controller_by_its_steps),
+        cmocka_unit_test(test_default_margins), cmocka_unit_test(test_predicted_rms),
+        cmocka_unit_test(test_imbalance)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
