@@ -41,7 +41,48 @@ static void tables_may_begin_and_end_within_a_step(void **state) {
     }
 }
 
+/* Segments of an object in the order of their usable spans, not of their first states: the one that
+ * begins first is usable last. */
+static void segments_follow_one_another_by_their_use(void **state) {
+    (void)state;
+    static const char meta[] =
+        "META_START\nOBJECT_NAME = SAT\nOBJECT_ID = 2022-001A\nCENTER_NAME = "
+        "EARTH\nREF_FRAME = GCRF\nTIME_SYSTEM = UTC\n";
+    char text[2000];
+    snprintf(text, sizeof text,
+             "CCSDS_OEM_VERS = 2.0\nCREATION_DATE = 2022-06-16T00:00:00\nORIGINATOR = TEST\n"
+             "%sSTART_TIME = 2022-06-16T00:00:00\nUSEABLE_START_TIME = 2022-06-16T00:05:00\n"
+             "STOP_TIME = 2022-06-16T00:10:00\nMETA_STOP\n"
+             "2022-06-16T00:00:00 7000 0 0 0 0 0\n2022-06-16T00:10:00 7000 0 0 0 0 0\n"
+             "%sSTART_TIME = 2022-06-16T00:02:00\nSTOP_TIME = 2022-06-16T00:05:00\nMETA_STOP\n"
+             "2022-06-16T00:02:00 8000 0 0 0 0 0\n2022-06-16T00:05:00 8000 0 0 0 0 0\n",
+             meta, meta);
+    bst_ctx ctx = {0};
+    bst_oem *oem = NULL;
+    bst_assert_ok(&ctx, bst_oem_read_buffer(&ctx, "x", text, strlen(text), &oem));
+    static const struct {
+        const char *utc;
+        double x_m;
+    } at[] = {{"2022-06-16T00:02:30Z", 8e6},
+              {"2022-06-16T00:04:50Z", 8e6},
+              {"2022-06-16T00:05:10Z", 7e6},
+              {"2022-06-16T00:09:00Z", 7e6}};
+    for (int i = 0; i < 4; i++) {
+        bst_time t;
+        bst_vec3 place, velocity;
+        bst_assert_ok(&ctx, bst_time_from_utc(&ctx, at[i].utc, &t));
+        bst_assert_ok(&ctx, bst_oem_state(&ctx, oem, 0, NULL, t, &place, &velocity));
+        bst_assert_close(place.x, at[i].x_m, 1e-3);
+    }
+    bst_time start, stop, first;
+    bst_oem_span(oem, 0, &start, &stop);
+    bst_assert_ok(&ctx, bst_time_from_utc(&ctx, "2022-06-16T00:02:00Z", &first));
+    bst_assert_close(bst_time_diff(start, first), 0.0, 1e-6);
+    bst_oem_free(oem);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(tables_may_begin_and_end_within_a_step)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(tables_may_begin_and_end_within_a_step),
+                                       cmocka_unit_test(segments_follow_one_another_by_their_use)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

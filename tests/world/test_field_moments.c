@@ -148,11 +148,43 @@ static void ghosts_are_as_wide_along_both_axes(void **state) {
     free_scene(&s);
 }
 
+/* The background of a window is that of its middle, whichever its sides: in a sky that grows along
+ * x and, twice as fast, along y. */
+static void backgrounds_are_those_of_the_middle(void **state) {
+    (void)state;
+    scene s = make_scene_in(test_world(
+        "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+        "]}, \"observers\": [{\"name\": \"neossat\", " TEST_NEOSSAT
+        ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": {\"pixel_scale_arcsec\": 3, "
+        "\"aperture_m\": 0.15, \"background\": {\"stray_e_per_s\": 200, \"gradient_e_per_s\": "
+        "[80, 160]}}}]}]}"));
+    push(s.history, 0, s.target);
+    push(s.history, 3000, s.target);
+    static const bst_window windows[] = {
+        {0, 0, 1024, 1024}, {100, 300, 200, 40}, {180, 220, 40, 200}, {600, 60, 300, 100}};
+    double found[4];
+    for (int k = 0; k < 4; k++) {
+        bst_field_options options = {.v_limit = 10, .margin_px = 5};
+        bst_assert_ok(&s.ctx, bst_field_track(&s.ctx, s.field, s.history, 0, 3000, RATE, &s.track));
+        bst_assert_ok(&s.ctx, bst_field_query(&s.ctx, s.field, &s.track, 0, 3000, RATE, windows[k],
+                                              &options, &s.truth, &s.sources, &s.count));
+        found[k] = s.truth.background_e;
+    }
+    bst_assert_close(found[1] / found[2], 1, 1e-6); /* both about (199.5, 319.5) */
+    /* from the middle of the sensor: (-312, -192) and (238, -402) px; linear, so that differences
+     * are as -312 - 2 * 192 and 238 - 2 * 402 */
+    bst_assert_close((found[3] - found[0]) / (found[1] - found[0]),
+                     (238.0 - 804.0) / (-312.0 - 384.0), 1e-4);
+    assert_true(found[0] - found[1] > 10);
+    free_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sigma_points_have_the_moments_of_the_track),
         cmocka_unit_test(streaks_of_wide_wings_are_as_long_as_they_are),
         cmocka_unit_test(ghosts_are_as_wide_along_both_axes),
+        cmocka_unit_test(backgrounds_are_those_of_the_middle),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
