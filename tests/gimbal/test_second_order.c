@@ -108,6 +108,41 @@ static void no_command_holds_still(void **state) {
     assert_false(plant.settled);
 }
 
+/* Two encoders with noise of their own, which goes into the measured attitude. */
+static void encoders_err_by_themselves(void **state) {
+    (void)state;
+    enum { STEPS = 20000 };
+    bst_mount_two_axis_config config = default_config();
+    config.encoder_noise_arcsec = 5.0;
+    bst_mount_two_axis plant;
+    make(&plant, &config, BST_QUAT_IDENTITY);
+    const double angle[2] = {0.4, -0.7};
+    const bst_los_command c = command_from(
+        BST_QUAT_IDENTITY, boresight(bst_mount_two_axis_attitude(angle)), (bst_vec3){0, 0, 0});
+    double mean[2] = {0.0}, second[3] = {0.0};
+    for (int n = 0; n < STEPS; n++) {
+        bst_mount_two_axis_step(&plant, &c, 0.0, true);
+        double off[2];
+        for (int i = 0; i < 2; i++) {
+            off[i] =
+                bst_wrap_angle(plant.encoder_rad[i] - plant.axis[i].angle_rad) / BST_ARCSEC_RAD;
+            mean[i] += off[i] / STEPS;
+        }
+        second[0] += off[0] * off[0] / STEPS;
+        second[1] += off[0] * off[1] / STEPS;
+        second[2] += off[1] * off[1] / STEPS;
+        const bst_vec3 seen = boresight(bst_mount_two_axis_attitude(plant.encoder_rad));
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(boresight(plant.q_measured_from_gcrf), seen)),
+                         0.0, 1e-9); /* small angles: (5 arcsec)^2 */
+    }
+    for (int i = 0; i < 2; i++) { /* five sigma of 20,000 values */
+        bst_assert_close(mean[i], 0.0, 5.0 * 5.0 / sqrt(STEPS));
+        bst_assert_close(second[2 * i], 25.0, 25.0 * 5.0 * sqrt(2.0 / STEPS));
+    }
+    bst_assert_close(second[1], 0.0, 25.0 * 5.0 / sqrt(STEPS));
+    bst_platform_free(&plant.platform);
+}
+
 /* Settled is what is near enough on the sky, in place and in motion, also far from the equator of
  * the outer axis and onto a direction that moves; by differences of the boresight's directions. */
 static void settled_by_the_sky(void **state) {
@@ -313,6 +348,7 @@ int main(void) {
         cmocka_unit_test(solve_and_attitude_agree),
         cmocka_unit_test(boresight_lands_on_the_commanded_direction),
         cmocka_unit_test(no_command_holds_still),
+        cmocka_unit_test(encoders_err_by_themselves),
         cmocka_unit_test(settled_by_the_sky),
         cmocka_unit_test(drift_is_real_and_unknown),
         cmocka_unit_test(bias_and_noise_are_errors_of_knowledge),
