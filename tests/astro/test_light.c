@@ -71,6 +71,28 @@ static void stars_agree_with_erfa(void **state) {
     }
 }
 
+/* Beside the Sun from other distances than the Earth's, without motion: within some arcminutes of
+ * its centre the deflection is limited, by the square of the distance beyond 1 au. */
+static void deflection_from_other_distances(void **state) {
+    (void)state;
+    static const double distances_au[] = {0.4, 0.99, 1.02, 1.9, 5.0};
+    for (int k = 0; k < 5; k++) {
+        const bst_vec3 towards = bst_vec3_unit((bst_vec3){0.3, -0.8, 0.2});
+        const bst_light light = {{0, 0, 0}, bst_vec3_scale(towards, distances_au[k] * BST_AU_M)};
+        double e[3] = {-towards.x, -towards.y, -towards.z}, deflected[3];
+        for (int i = 0; i < 24; i++) {
+            const double off = 1e-5 * pow(2.0, 0.6 * i); /* 2 arcsec to 8 degrees */
+            const bst_vec3 star =
+                bst_vec3_unit(bst_vec3_axpy(towards, tan(off), bst_vec3_perpendicular(towards)));
+            double p[3] = {star.x, star.y, star.z};
+            eraLdsun(p, e, distances_au[k], deflected);
+            /* ERFA's result is no unit vector: the square of the deflection, 1e-11 rad */
+            bst_assert_close(bst_vec3_angle(bst_light_apparent_star(&light, star), vec(deflected)),
+                             0.0, MICROARCSEC);
+        }
+    }
+}
+
 static void inverses_return_to_the_start(void **state) {
     (void)state;
     bst_light light =
@@ -138,6 +160,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(stars_agree_with_astropy),
         cmocka_unit_test(stars_agree_with_erfa),
+        cmocka_unit_test(deflection_from_other_distances),
         cmocka_unit_test(inverses_return_to_the_start),
         cmocka_unit_test(aberration_points_forward),
         cmocka_unit_test(near_objects_do_not_see_the_earths_motion_twice),

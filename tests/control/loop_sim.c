@@ -362,7 +362,8 @@ void sim_run(const sim_options *o, sim_result *r) {
         tracks[i] = calloc(1, sizeof *tracks[i] + 4 * sizeof(bst_track));
         assert_non_null(tracks[i]);
     }
-    bst_pointing_telemetry *telemetry = calloc(1, sizeof *telemetry + sizeof(bst_pointing_sample));
+    bst_pointing_telemetry *telemetry =
+        calloc(1, sizeof *telemetry + 3 * sizeof(bst_pointing_sample));
     assert_true(errors && telemetry);
     *r = (sim_result){.confirmed_s = INFINITY, .command_hash = UINT64_C(0xCBF29CE484222325)};
     int64_t updates = 0;
@@ -443,11 +444,10 @@ void sim_run(const sim_options *o, sim_result *r) {
         /* control at 20 Hz and whenever tracks arrive */
         bool due = taken < measured && tick >= pending_tick[taken % PENDING];
         if (tick % control_period == 0 || due) {
-            telemetry->written++;
-            telemetry->capacity = 1;
+            telemetry->capacity = 3;
             telemetry->settled = plant.settled;
             telemetry->limited = plant.limited;
-            telemetry->items[0] =
+            telemetry->items[telemetry->written++ % 3] =
                 (bst_pointing_sample){.tick = tick, .q_cam_from_gcrf = plant.q_measured_from_gcrf};
             if (o->restore_every > 0 && ++updates % o->restore_every == 0) {
                 restore_control(&ctx, &control);

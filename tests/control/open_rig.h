@@ -10,6 +10,7 @@
 #include "tests/test_support.h"
 
 #define TICKS 1000
+#define RING 3 /* samples of telemetry */
 #define PX (3.0 * BST_ARCSEC_RAD)
 #define FIELD (1024 * PX)
 #define DRIFT (15.0 * BST_ARCSEC_RAD) /* of the region's places, rad/s */
@@ -88,7 +89,7 @@ static bst_control_config defaults(void) {
 
 static bst_status rig_try(rig *r, const bst_control_config *config, const bst_region *region) {
     r->tracks = calloc(1, sizeof *r->tracks + 4 * sizeof(bst_track));
-    r->telemetry = calloc(1, sizeof *r->telemetry + sizeof(bst_pointing_sample));
+    r->telemetry = calloc(1, sizeof *r->telemetry + RING * sizeof(bst_pointing_sample));
     assert_true(r->tracks && r->telemetry);
     r->q_body = r->q_cam = BST_QUAT_IDENTITY;
     bst_control_env env = {.tick_rate_hz = TICKS,
@@ -129,10 +130,11 @@ static void step(rig *r, int64_t tick, bool frame) {
         r->q_cam = bst_quat_look(
             bst_vec3_axpy(r->command.direction_gcrf, dt, r->command.rate_gcrf_radps), r->image_x);
     }
-    r->telemetry->written = r->telemetry->capacity = 1;
+    r->telemetry->capacity = RING;
     r->telemetry->settled = true;
     r->telemetry->q_body_from_gcrf = r->q_body;
-    r->telemetry->items[0] = (bst_pointing_sample){.tick = tick, .q_cam_from_gcrf = r->q_cam};
+    r->telemetry->items[r->telemetry->written++ % RING] =
+        (bst_pointing_sample){.tick = tick, .q_cam_from_gcrf = r->q_cam};
     bst_control_telemetry(&r->control, r->telemetry, &nav);
     r->control.transition_count = 0;
     if (frame) {

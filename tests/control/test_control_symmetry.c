@@ -14,6 +14,8 @@
 #define LATENCY_S 0.4
 #define BARY_MPS ((bst_vec3){1e4, 2.5e4, -7e3})
 
+#define RING 3 /* samples of telemetry */
+
 typedef struct rig {
     bst_ctx ctx;
     bst_control control;
@@ -75,7 +77,7 @@ static void open_rig(rig *r, const bst_control_config *config, bst_quat turn, in
     r->hz = hz;
     r->roll = bst_quat_from_rotvec((bst_vec3){0, 0, 0.5 * BST_PI * quarters});
     r->tracks = calloc(1, sizeof *r->tracks + 4 * sizeof(bst_track));
-    r->telemetry = calloc(1, sizeof *r->telemetry + sizeof(bst_pointing_sample));
+    r->telemetry = calloc(1, sizeof *r->telemetry + RING * sizeof(bst_pointing_sample));
     assert_true(r->tracks && r->telemetry);
     bst_control_env env = {.tick_rate_hz = hz,
                            .pixel_rad = PX,
@@ -128,10 +130,11 @@ static void step(rig *r, int k) {
         }
     }
     r->before[k % 16] = r->q_cam;
-    r->telemetry->written = r->telemetry->capacity = 1;
+    r->telemetry->capacity = RING;
     r->telemetry->settled = true;
     r->telemetry->q_body_from_gcrf = bst_quat_conj(r->turn);
-    r->telemetry->items[0] = (bst_pointing_sample){.tick = tick, .q_cam_from_gcrf = r->q_cam};
+    r->telemetry->items[r->telemetry->written++ % RING] =
+        (bst_pointing_sample){.tick = tick, .q_cam_from_gcrf = r->q_cam};
     bst_control_telemetry(&r->control, r->telemetry, &nav);
     r->control.transition_count = 0;
     double mid_s = s - LATENCY_S - 0.25;

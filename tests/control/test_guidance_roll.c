@@ -229,8 +229,8 @@ static void the_event_has_the_length_of_the_roll(void **state) {
     const struct {
         double miss_deg, from_deg, given_deg, chosen_deg, length_deg;
     } cases[] = {
-        {12.0, 0.0, NAN, 20.0, 20.0},     {-12.0, 0.0, NAN, -20.0, -20.0},
-        {12.0, -5.0, NAN, 20.0, 25.0},    {-12.0, -5.0, NAN, -20.0, -15.0},
+        {12.0, 0.0, NAN, 20.0, 20.0},   {-12.0, 0.0, NAN, -20.0, -20.0},
+        {12.0, -5.0, NAN, 20.0, 25.0},  {-12.0, -5.0, NAN, -20.0, -15.0},
         {12.0, 5.0, -10.0, 20.0, 30.0},
     };
     for (int i = 0; i < 5; i++) {

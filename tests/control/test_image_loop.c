@@ -2,6 +2,7 @@
  * commanded, wrong by a rotation that the loop has to find. */
 #include "boresight/rng.h"
 #include "control/loop/image_loop.h"
+#include "control/loop/tracking_loop.h"
 #include "tests/test_support.h"
 
 #define TICKS 1000 /* a second */
@@ -300,8 +301,38 @@ static void test_one_frame_by_hand(void **state) {
     }
 }
 
+/* The compensator crosses over where it shall and with its margin, in a loop whose latencies all
+ * differ: half an exposure, that of frames, that of commands, and the servo's lag. */
+static void test_designed_for_all_latencies(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_compensator_config config = {.type = BST_COMPENSATOR_PI,
+                                           .crossover_hz = 0.11,
+                                           .phase_margin_deg = 40.0,
+                                           .gain_scale = 1.0};
+    const bst_image_loop_env env = {.tick_rate_hz = TICKS,
+                                    .frame_period_s = 0.5,
+                                    .frame_exposure_s = 0.3,
+                                    .frame_latency_s = 0.21,
+                                    .command_latency_s = 0.17,
+                                    .servo_lag_s = 0.13,
+                                    .jump_rad = 5e-4};
+    bst_assert_ok(&ctx, bst_image_loop_init(&ctx, &loop, &config, &env));
+    /* the command acts 0.15 + 0.21 + 0.17 s after the middle of an exposure, the mount later */
+    const bst_tracking_timing timing = {0.5, 0.3, 0.36, 0.53, 0.53};
+    const bst_control_servo_response servo = {.delay_s = 0.13};
+    bst_tracking_loop *tracking;
+    bst_assert_ok(&ctx,
+                  bst_tracking_loop_create(&ctx, &timing, &servo, &loop.axis[0], NULL, &tracking));
+    const double complex open = bst_tracking_open(tracking, 2.0 * BST_PI * 0.11);
+    bst_assert_close(cabs(open), 1.0, 1e-6);
+    bst_assert_close(carg(-open) / BST_DEG_RAD, 40.0, 1e-4);
+    bst_tracking_loop_free(tracking);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_designed_for_all_latencies),
         cmocka_unit_test(test_one_frame_by_hand),
         cmocka_unit_test(test_bias_and_drift),
         cmocka_unit_test(test_late),

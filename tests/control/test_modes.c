@@ -7,6 +7,7 @@
 #include "tests/test_support.h"
 
 #define TICKS 1000
+#define RING 3 /* samples of telemetry */
 #define PX (3.0 * BST_ARCSEC_RAD)
 
 /* A cue that moves along a great circle at 50 arcsec/s. */
@@ -60,7 +61,7 @@ static void rig_open(rig *r, bst_control_config *config_or_null, bool cue_valid)
                            .cue_user = &r->cue_valid};
     bst_assert_ok(&r->ctx, bst_control_init(&r->ctx, &r->control, &config, &env));
     r->tracks = calloc(1, sizeof *r->tracks + 4 * sizeof(bst_track));
-    r->telemetry = calloc(1, sizeof *r->telemetry + sizeof(bst_pointing_sample));
+    r->telemetry = calloc(1, sizeof *r->telemetry + RING * sizeof(bst_pointing_sample));
     assert_true(r->tracks && r->telemetry);
 }
 
@@ -78,10 +79,10 @@ static void step(rig *r, int64_t tick, bool frame) {
                                         (double)(tick - r->command.tick) / TICKS,
                                         r->command.rate_gcrf_radps));
     }
-    r->telemetry->written = r->telemetry->capacity = 1;
+    r->telemetry->capacity = RING;
     r->telemetry->settled = true;
-    r->telemetry->items[0].tick = tick;
-    r->telemetry->items[0].q_cam_from_gcrf = bst_quat_look(d, (bst_vec3){0, 1, 0});
+    r->telemetry->items[r->telemetry->written++ % RING] = (bst_pointing_sample){
+        .tick = tick, .q_cam_from_gcrf = bst_quat_look(d, (bst_vec3){0, 1, 0})};
     bst_control_telemetry(&r->control, r->telemetry, &nav);
     r->control.transition_count = 0;
     if (frame) {

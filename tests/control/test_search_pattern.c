@@ -191,6 +191,22 @@ static void times_of_slews_and_sweeps(void **state) {
     /* first: its command 0.8 s into a period, so 1 + 3 periods; second: 0.8 + 0.707 + 0.1, 2 + 3;
      * third: 0.8 + 2.5 + 0.1, 4 + 3 */
     bst_assert_close(bst_search_sweep_s(&s, &timing), 16.0, 1e-12);
+    /* each time by itself longer: 1.1, 1.1 + 0.807, 1.1 + 2.6; 1.2, 1.2 + 0.807, 1.2 + 2.6; 0.8,
+     * 0.8 + 1.507, 0.8 + 3.3 */
+    bst_search_timing t = timing;
+    t.latency_s = 0.6;
+    bst_assert_close(bst_search_sweep_s(&s, &t), 2.0 + 2.0 + 4.0 + 9.0, 1e-12);
+    t = timing;
+    t.exposure_s = 0.9;
+    bst_assert_close(bst_search_sweep_s(&s, &t), 2.0 + 3.0 + 4.0 + 9.0, 1e-12);
+    t = timing;
+    t.settle_s = 0.8;
+    bst_assert_close(bst_search_sweep_s(&s, &t), 1.0 + 3.0 + 5.0 + 9.0, 1e-12);
+    /* periods of 0.4 s: 2, 5 and 9 of them */
+    t = timing;
+    t.period_s = 0.4;
+    t.frames = 2;
+    bst_assert_close(bst_search_sweep_s(&s, &t), 0.4 * (2.0 + 5.0 + 9.0 + 3.0), 1e-12);
 }
 
 int main(void) {

@@ -88,6 +88,13 @@ static bst_status look(void *user, const char *scope, const char *channel, const
     apparent(f, &f->ctx, (double)tick / 6000.0, want);
     double off = bst_vec3_norm(bst_vec3_sub(z, (bst_vec3){want[0], want[1], want[2]}));
     f->worst_rad = fmax(f->worst_rad, off);
+    /* the camera's x axis is as near to the body's as it can be: what of that is across the sight
+     */
+    const bst_quat back = bst_quat_conj(bst_world_body_attitude(f->world, 0, 0));
+    const bst_vec3 body_x = bst_quat_rotate(back, (bst_vec3){1, 0, 0}),
+                   x = bst_quat_rotate(bst_quat_conj(sample->q_cam_from_gcrf), (bst_vec3){1, 0, 0});
+    const bst_vec3 across = bst_vec3_axpy(body_x, -bst_vec3_dot(body_x, z), z);
+    bst_assert_close(bst_vec3_dot(x, across), bst_vec3_norm(across), 1e-12);
     f->samples++;
     return BST_OK;
 }

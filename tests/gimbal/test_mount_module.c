@@ -50,8 +50,9 @@ static const bst_module_desc commander_module = {.abi = BST_MODULE_ABI,
                                                  .step = commander_step,
                                                  .destroy = commander_destroy};
 static const bst_module_desc *const modules[] = {
-    &bst_gimbal_azimuth_elevation_module, &bst_gimbal_cross_elevation_module, &commander_module};
-static const bst_scenario_registry registry = {.modules = modules, .count = 3};
+    &bst_gimbal_azimuth_elevation_module, &bst_gimbal_cross_elevation_module, &commander_module,
+    &bst_gimbal_second_order_module};
+static const bst_scenario_registry registry = {.modules = modules, .count = 4};
 
 typedef struct fixture {
     bst_ctx ctx;
@@ -153,19 +154,22 @@ static bst_vec3 pointed(int type, double outer, double inner) {
     return type == 0 ? (bst_vec3){si, -ci * so, ci * co} : (bst_vec3){ci * so, -si, ci * co};
 }
 
-static const char *const types[] = {"azimuth_elevation", "cross_elevation"};
+static const char *const types[] = {"azimuth_elevation", "cross_elevation", "second_order"};
+
+#define BELIEFS                                                      \
+    "\"platform\": {\"telemetry_rate_hz\": 50, \"nav_rate_hz\": 4, " \
+    "\"attitude_bias_arcsec\": [40, -30, 20], \"drift_arcsec_per_s\": [1800, 3000, -2400]}"
 
 /* The target stands at (25, -40) degrees in the frame of the body and moves along the outer axis'
  * circle at 0.2 deg/s; the spacecraft believes itself turned, and turns without knowing it. */
 static void it_points_by_what_it_believes(void **state) {
     (void)state;
-    for (int type = 0; type < 2; type++) {
+    for (int type = 0; type < 3; type++) { /* the last one has the second one's axes */
         fixture f;
-        open_simulation(
-            &f, types[type],
-            "\"platform\": {\"telemetry_rate_hz\": 50, \"nav_rate_hz\": 4, "
-            "\"attitude_bias_arcsec\": [40, -30, 20], \"drift_arcsec_per_s\": [1800, 3000, "
-            "-2400]}");
+        open_simulation(&f, types[type],
+                        type < 2
+                            ? BELIEFS
+                            : "\"rate_limit_degps\": 8, \"encoder_noise_arcsec\": 0.05, " BELIEFS);
         const double outer = 25.0 * BST_DEG_RAD, inner = -40.0 * BST_DEG_RAD;
         const double rate = 0.2 * BST_DEG_RAD, seconds = 20.0;
         bst_vec3 d = pointed(type, outer, inner);

@@ -1,6 +1,7 @@
 /* The body that carries the mount: noise of its measured attitude, drift, jitter between samples.
  */
 #include "gimbal/platform.h"
+#include "gimbal/platform_step.h"
 
 #include "tests/test_support.h"
 
@@ -117,10 +118,52 @@ static void jitter_between_samples_is_linear_on_both_axes(void **state) {
     assert_true(moved[0] > 50 * 0.1 * BST_ARCSEC_RAD && moved[1] > 50 * 0.1 * BST_ARCSEC_RAD);
 }
 
+/* The telemetry of a mount without errors of its own has the error of the body's attitude. */
+static void a_reading_is_in_the_measured_body(void **state) {
+    (void)state;
+    bst_platform_config config = quiet();
+    const double bias[3] = {30.0, -50.0, 70.0};
+    memcpy(config.attitude_bias_arcsec, bias, sizeof bias);
+    const bst_quat nominal = bst_quat_look(bst_vec3_from_radec(2.0, -0.7), (bst_vec3){0, 0, 1});
+    const bst_quat camera = bst_quat_unit((bst_quat){0.3, -0.1, 0.2, 0.8});
+    bst_platform p = make(&config, nominal);
+    const bst_gimbal_reading r = bst_gimbal_exact(&p, 5, camera);
+    const bst_vec3 body = turn(nominal, r.q_body_from_gcrf),
+                   seen = turn(bst_quat_mul(camera, r.q_body_from_gcrf), r.q_cam_from_gcrf);
+    bst_assert_close(body.x / BST_ARCSEC_RAD, 30.0, 1e-3); /* the order of the rotations */
+    bst_assert_close(body.y / BST_ARCSEC_RAD, -50.0, 1e-3);
+    bst_assert_close(body.z / BST_ARCSEC_RAD, 70.0, 1e-3);
+    bst_assert_close(bst_vec3_norm(seen), 0.0, 1e-14);
+    assert_true(r.settled);
+    bst_platform_free(&p);
+}
+
+/* Each number of the bands in its own place. */
+static void bands_of_jitter_in_radians(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_platform_config config = quiet();
+    config.jitter_low_px_rms = 0.3;
+    config.jitter_low_cutoff_hz = 0.07;
+    config.jitter_high_px_rms = 0.2;
+    config.jitter_high_band_hz[0] = 11;
+    config.jitter_high_band_hz[1] = 190;
+    bst_jitter_spectrum spectrum;
+    bst_assert_ok(&ctx, bst_platform_jitter_spectrum(&ctx, &config, 4e-5, &spectrum));
+    bst_assert_close(spectrum.flat.low_rms_rad, 1.2e-5, 1e-20);
+    bst_assert_close(spectrum.flat.low_cutoff_hz, 0.07, 0.0);
+    bst_assert_close(spectrum.flat.high_rms_rad, 8e-6, 1e-20);
+    bst_assert_close(spectrum.flat.high_min_hz, 11.0, 0.0);
+    bst_assert_close(spectrum.flat.high_max_hz, 190.0, 0.0);
+    bst_jitter_spectrum_free(&spectrum);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(attitude_noise_is_the_same_about_three_axes_and_uncorrelated),
         cmocka_unit_test(drift_turns_the_body_about_its_own_axes),
+        cmocka_unit_test(a_reading_is_in_the_measured_body),
+        cmocka_unit_test(bands_of_jitter_in_radians),
         cmocka_unit_test(jitter_between_samples_is_linear_on_both_axes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -108,6 +108,91 @@ static void no_command_holds_still(void **state) {
     assert_false(plant.settled);
 }
 
+/* Two encoders with noise of their own, which goes into the measured attitude. */
+static void encoders_err_by_themselves(void **state) {
+    (void)state;
+    enum { STEPS = 20000 };
+    bst_mount_two_axis_config config = default_config();
+    config.encoder_noise_arcsec = 5.0;
+    bst_mount_two_axis plant;
+    make(&plant, &config, BST_QUAT_IDENTITY);
+    const double angle[2] = {0.4, -0.7};
+    const bst_los_command c = command_from(
+        BST_QUAT_IDENTITY, boresight(bst_mount_two_axis_attitude(angle)), (bst_vec3){0, 0, 0});
+    double mean[2] = {0.0}, second[3] = {0.0};
+    for (int n = 0; n < STEPS; n++) {
+        bst_mount_two_axis_step(&plant, &c, 0.0, true);
+        double off[2];
+        for (int i = 0; i < 2; i++) {
+            off[i] =
+                bst_wrap_angle(plant.encoder_rad[i] - plant.axis[i].angle_rad) / BST_ARCSEC_RAD;
+            mean[i] += off[i] / STEPS;
+        }
+        second[0] += off[0] * off[0] / STEPS;
+        second[1] += off[0] * off[1] / STEPS;
+        second[2] += off[1] * off[1] / STEPS;
+        const bst_vec3 seen = boresight(bst_mount_two_axis_attitude(plant.encoder_rad));
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(boresight(plant.q_measured_from_gcrf), seen)),
+                         0.0, 1e-9); /* small angles: (5 arcsec)^2 */
+    }
+    for (int i = 0; i < 2; i++) { /* five sigma of 20,000 values */
+        bst_assert_close(mean[i], 0.0, 5.0 * 5.0 / sqrt(STEPS));
+        bst_assert_close(second[2 * i], 25.0, 25.0 * 5.0 * sqrt(2.0 / STEPS));
+    }
+    bst_assert_close(second[1], 0.0, 25.0 * 5.0 / sqrt(STEPS));
+    bst_platform_free(&plant.platform);
+}
+
+/* Settled is what is near enough on the sky, in place and in motion, also far from the equator of
+ * the outer axis and onto a direction that moves; by differences of the boresight's directions. */
+static void settled_by_the_sky(void **state) {
+    (void)state;
+    static const double inner_deg[] = {0.0, 40.0, 75.0, -68.0};
+    int counts[2] = {0}, fast = 0;
+    for (int k = 0; k < 8; k++) {
+        bst_mount_two_axis_config config = default_config();
+        config.settle_tolerance_arcsec = 20.0;
+        bst_mount_two_axis plant;
+        make(&plant, &config, BST_QUAT_IDENTITY);
+        const double tolerance = 20.0 * BST_ARCSEC_RAD,
+                     slow = tolerance * plant.axis[0].spec.natural_frequency_radps;
+        const double inner = inner_deg[k % 4] * BST_DEG_RAD, moves = k < 4 ? 0.0 : 3e-3;
+        const double from[2] = {0.2, inner};
+        double t = 0.0;
+        bst_vec3 before = {0, 0, 0};
+        for (int n = 0; n < 62000; n++, t += DT) {
+            /* there by 40 s; then jumps of some tolerances every 4 s, and rates that turn back */
+            const int late = n < 40000 ? 0 : n - 40000, turns = late / 2000;
+            const double jump = late == 0 ? 0.0 : (turns / 2 % 2 ? 1 : -1) * 9 * tolerance;
+            const double swing = late == 0 ? 0.0
+                                           : (turns % 2 ? 2000 - late % 2000 : late % 2000) * 4e-6,
+                         swings = late == 0   ? 0.0
+                                  : turns % 2 ? -4e-3
+                                              : 4e-3;
+            const double angle[2] = {from[0] + moves * t + jump,
+                                     from[1] - 0.3 * moves * t + 0.4 * jump + swing};
+            const bst_vec3 to = boresight(bst_mount_two_axis_attitude(angle));
+            const double next[2] = {angle[0] + moves * DT, angle[1] + (swings - 0.3 * moves) * DT};
+            const bst_vec3 rate = bst_vec3_scale(
+                bst_vec3_sub(boresight(bst_mount_two_axis_attitude(next)), to), 1.0 / DT);
+            const bst_los_command c = command_from(BST_QUAT_IDENTITY, to, rate);
+            bst_mount_two_axis_step(&plant, &c, 0.0, true);
+            const bst_vec3 off = bst_vec3_sub(boresight(plant.q_cam_from_gcrf), to);
+            const double far = bst_vec3_norm(off),
+                         speed = bst_vec3_norm(bst_vec3_sub(off, before)) / DT;
+            before = off;
+            /* not at the edge, nor just after a jump: a step's difference is of its middle */
+            const bool sure = fabs(far / tolerance - 1) > 0.05 && fabs(speed / slow - 1) > 0.1;
+            if (n >= 40000 && n % 2000 > 2 && sure) {
+                assert_int_equal(plant.settled, far < tolerance && speed < slow);
+                counts[plant.settled]++;
+                fast += far < tolerance && speed > slow;
+            }
+        }
+    }
+    assert_true(counts[0] > 500 && counts[1] > 500 && fast > 10);
+}
+
 static void drift_is_real_and_unknown(void **state) {
     (void)state;
     bst_mount_two_axis_config config = default_config();
@@ -263,6 +348,8 @@ int main(void) {
         cmocka_unit_test(solve_and_attitude_agree),
         cmocka_unit_test(boresight_lands_on_the_commanded_direction),
         cmocka_unit_test(no_command_holds_still),
+        cmocka_unit_test(encoders_err_by_themselves),
+        cmocka_unit_test(settled_by_the_sky),
         cmocka_unit_test(drift_is_real_and_unknown),
         cmocka_unit_test(bias_and_noise_are_errors_of_knowledge),
         cmocka_unit_test(keyhole_stays_finite_and_recovers),

@@ -97,6 +97,52 @@ static void test_default_margins(void **state) {
     }
 }
 
+/* The controller's own steps at an error that swings, with the mean rate since a time before, and
+ * its torques held: their part at that frequency. The gyroscope is faster than the controller, or
+ * slower. */
+static void test_controller_by_its_steps(void **state) {
+    (void)state;
+    enum { STEPS = 4000 };
+    static const double gyro_hz[] = {50.0, 4.0};
+    for (int i = 0; i < 12; i++) {
+        const int axis = i % 3, cycles = i < 6 ? 40 : 330;
+        bst_spacecraft_config c = config_make(BST_LAW_INERTIAL);
+        c.attitude.rate_hz = 10.0;
+        c.attitude.bandwidth_hz = 0.05;
+        c.attitude.integral_hz = 0.02;
+        c.gyro.rate_hz = gyro_hz[i / 3 % 2];
+        const double dt = 0.1, rate_s = fmax(dt, 1.0 / c.gyro.rate_hz), tiny = 1e-7;
+        const double hz = cycles / (STEPS * dt), w = 2.0 * BST_PI * hz;
+        bst_spacecraft_attitude_control control;
+        const bst_spacecraft_attitude_control_spec spec = bst_spacecraft_attitude_control_of(&c);
+        bst_spacecraft_attitude_control_init(&control, &spec);
+        const bst_spacecraft_attitude_reference still = {.q_body_from_gcrf = BST_QUAT_IDENTITY};
+        double re = 0.0, im = 0.0;
+        for (int n = 0; n < STEPS; n++) {
+            const double t = n * dt, e = tiny * cos(w * t);
+            const double rate = (e - tiny * cos(w * (t - rate_s))) / rate_s;
+            bst_vec3 turn = {0, 0, 0}, spin = turn;
+            *(axis == 0 ? &turn.x : axis == 1 ? &turn.y : &turn.z) = e;
+            *(axis == 0 ? &spin.x : axis == 1 ? &spin.y : &spin.z) = rate;
+            const bst_vec3 torque = bst_spacecraft_attitude_control_step(
+                &control, &still, bst_quat_turn_frame(BST_QUAT_IDENTITY, turn), spin,
+                (bst_vec3){0, 0, 0}, false);
+            const double about = axis == 0 ? torque.x : axis == 1 ? torque.y : torque.z;
+            re += -about / tiny * cos(w * t) * 2.0 / STEPS;
+            im -= -about / tiny * sin(w * t) * 2.0 / STEPS;
+        }
+        /* held for a step: sin(w dt / 2) / (w dt / 2), later by half of it */
+        const double half = 0.5 * w * dt, held = sin(half) / half;
+        const double x = held * (re * cos(half) + im * sin(half));
+        const double y = held * (im * cos(half) - re * sin(half));
+        const bst_spacecraft_response r = bst_spacecraft_response_at(&c, axis, hz);
+        const double size = hypot(x, y);
+        /* the torque's products of rates, and the rotation vector's cube */
+        bst_assert_close(r.controller[0], x, 1e-5 * size);
+        bst_assert_close(r.controller[1], y, 1e-5 * size);
+    }
+}
+
 /* RMS of pointing and knowledge against the integral of their spectra. */
 static void test_predicted_rms(void **state) {
     (void)state;
@@ -155,13 +201,15 @@ static void test_imbalance(void **state) {
                                    .static_imbalance_kgm = 1e-5,
                                    .dynamic_imbalance_kgm2 = 1e-6,
                                    .position_m = {0.0, 0.2, 0.1}};
-    for (int fast = 0; fast < 2; fast++) {
-        wheels[0].speed_rpm = fast ? 30000.0 : 1200.0;
+    static const double speeds_hz[] = {20.0, 170.0, 390.0, 500.0}; /* followed up to 400 Hz */
+    for (int k = 0; k < 4; k++) {
+        const bool fast = k == 3;
+        wheels[0].speed_rpm = 60.0 * speeds_hz[k];
         flight f = {.dt_s = 1e-3};
         bst_assert_ok(&ctx, create(&c, f.dt_s, 0, &f.craft));
         double expected, hz, least = INFINITY, most = -INFINITY;
         bst_spacecraft_imbalance_line(&c, 0, 0, &hz, &expected);
-        bst_assert_close(hz, fast ? 500.0 : 20.0, 1e-9);
+        bst_assert_close(hz, speeds_hz[k], 1e-9);
         fly(&f, 0.9);
         for (int n = 0; n < 100; n++) { /* two cycles; over many, nutation moves the middle */
             bst_vec3 w = fly(&f, 1e-3)->body.rate_radps;
@@ -174,11 +222,13 @@ static void test_imbalance(void **state) {
         double sum = expected * expected + about_y * about_y + about_z * about_z;
         /* straight lines between steps have (2 + cos w dt) / 3 of a sine's variance; the wheel's
          * inertia is in the response's plant and not in the blur: 1e-3 of 10 */
-        double share = fast ? 1.0 : (1.0 - cos(2.0 * BST_PI * 20.0 * 1e-3)) / 3.0;
+        double share = fast ? 1.0 : (1.0 - cos(2.0 * BST_PI * hz * 1e-3)) / 3.0;
         bst_assert_close(bst_spacecraft_at(f.craft)->unresolved_rad2 / (share * sum / 6.0), 1.0,
                          1e-3);
         if (fast) {
             bst_assert_close(most - least, 0.0, 1e-12); /* none of it in the motion */
+        } else if (k > 0) {                             /* too few steps a cycle for a peak */
+            assert_true(0.5 * (most - least) / (2.0 * BST_PI * hz) > 0.5 * expected);
         } else {
             double turn = 0.5 * (most - least) / (2.0 * BST_PI * hz);
             /* 50 steps a cycle: the peak is missed by (w dt)^2 / 8 at most */
@@ -188,9 +238,35 @@ static void test_imbalance(void **state) {
     }
 }
 
+/* A gyroscope's bias that the filter knows turns nothing: without the integral part it would be
+ * held by an error of 2 damping bias / natural frequency, 20 arcminutes here. */
+static void test_a_known_bias_turns_nothing(void **state) {
+    (void)state;
+    bst_spacecraft_config c = config_make(BST_LAW_INERTIAL);
+    c.disturbances.gravity_gradient = false;
+    c.attitude.integral_hz = 0.0;
+    c.gyro.bias_sigma_degph = 500.0;
+    flight f = start(&c, 5);
+    fly(&f, 400.0);
+    bst_vec3 mean = {0, 0, 0};
+    for (int k = 0; k < 200; k++) {
+        const bst_spacecraft_now *now = fly(&f, 1.0);
+        mean = bst_vec3_axpy(
+            mean, 1.0 / 200,
+            bst_attitude_filter_error(now->body.q_body_from_gcrf, now->reference.q_body_from_gcrf));
+    }
+    print_message("mean error %.2f arcsec\n", bst_vec3_norm(mean) / BST_ARCSEC_RAD);
+    /* noise of a few arcsec, averaged */
+    assert_true(bst_vec3_norm(mean) < 15.0 * BST_ARCSEC_RAD);
+    bst_spacecraft_free(f.craft);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_margin_in_the_loop), cmocka_unit_test(test_default_margins),
-        cmocka_unit_test(test_predicted_rms), cmocka_unit_test(test_imbalance)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_margin_in_the_loop),
+                                       cmocka_unit_test(test_controller_by_its_steps),
+                                       cmocka_unit_test(test_default_margins),
+                                       cmocka_unit_test(test_predicted_rms),
+                                       cmocka_unit_test(test_imbalance),
+                                       cmocka_unit_test(test_a_known_bias_turns_nothing)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

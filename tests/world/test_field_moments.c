@@ -148,11 +148,125 @@ static void ghosts_are_as_wide_along_both_axes(void **state) {
     free_scene(&s);
 }
 
+/* The background of a window is that of its middle, whichever its sides: in a sky that grows along
+ * x and, twice as fast, along y. */
+static void backgrounds_are_those_of_the_middle(void **state) {
+    (void)state;
+    scene s = make_scene_in(test_world(
+        "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+        "]}, \"observers\": [{\"name\": \"neossat\", " TEST_NEOSSAT
+        ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": {\"pixel_scale_arcsec\": 3, "
+        "\"aperture_m\": 0.15, \"background\": {\"stray_e_per_s\": 200, \"gradient_e_per_s\": "
+        "[80, 160]}}}]}]}"));
+    push(s.history, 0, s.target);
+    push(s.history, 3000, s.target);
+    static const bst_window windows[] = {
+        {0, 0, 1024, 1024}, {100, 300, 200, 40}, {180, 220, 40, 200}, {600, 60, 300, 100}};
+    double found[4];
+    for (int k = 0; k < 4; k++) {
+        bst_field_options options = {.v_limit = 10, .margin_px = 5};
+        bst_assert_ok(&s.ctx, bst_field_track(&s.ctx, s.field, s.history, 0, 3000, RATE, &s.track));
+        bst_assert_ok(&s.ctx, bst_field_query(&s.ctx, s.field, &s.track, 0, 3000, RATE, windows[k],
+                                              &options, &s.truth, &s.sources, &s.count));
+        found[k] = s.truth.background_e;
+    }
+    bst_assert_close(found[1] / found[2], 1, 1e-6); /* both about (199.5, 319.5) */
+    /* from the middle of the sensor: (-312, -192) and (238, -402) px; linear, so that differences
+     * are as -312 - 2 * 192 and 238 - 2 * 402 */
+    bst_assert_close((found[3] - found[0]) / (found[1] - found[0]),
+                     (238.0 - 804.0) / (-312.0 - 384.0), 1e-4);
+    assert_true(found[0] - found[1] > 10);
+    free_scene(&s);
+}
+
+/* Each star that has its light in an oblong window is among the sources of the window's query. */
+static void oblong_windows_have_their_stars(void **state) {
+    (void)state;
+    enum { MOST = 1000 };
+    scene s = make_scene(GX5);
+    push(s.history, 0, s.target);
+    push(s.history, 3000, s.target);
+    query(&s, 0.0);
+    static struct {
+        uint32_t id;
+        double x, y;
+    } stars[MOST];
+    int count = 0, inside = 0;
+    for (int i = 0; i < s.count; i++) {
+        if (s.sources[i].kind == BST_SOURCE_STAR && count < MOST) {
+            bst_truth_item item;
+            bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
+            stars[count].id = s.sources[i].id;
+            stars[count].x = item.x_chief_px;
+            stars[count++].y = item.y_chief_px;
+        }
+    }
+    for (int k = 0; k < 32; k++) {
+        const bst_window w = k % 2 ? (bst_window){0, 64 * (k / 2), 1024, 64}
+                                   : (bst_window){64 * (k / 2), 0, 64, 1024};
+        bst_field_options options = {.v_limit = 13, .margin_px = 5};
+        bst_assert_ok(&s.ctx, bst_field_query(&s.ctx, s.field, &s.track, 0, 3000, RATE, w, &options,
+                                              &s.truth, &s.sources, &s.count));
+        for (int n = 0; n < count; n++) {
+            if (stars[n].x > w.x0 - 0.5 && stars[n].x < w.x0 + w.width - 0.5 &&
+                stars[n].y > w.y0 - 0.5 && stars[n].y < w.y0 + w.height - 0.5) {
+                bool found = false;
+                for (int i = 0; i < s.count; i++) {
+                    found = found || (s.sources[i].kind == BST_SOURCE_STAR &&
+                                      s.sources[i].id == stars[n].id);
+                }
+                assert_true(found);
+                inside++;
+            }
+        }
+    }
+    assert_true(count < MOST && inside > 40); /* each in a column and in a row */
+    free_scene(&s);
+}
+
+/* What is said to saturate: the peak of a Gaussian that is drawn over a length, with 15 % for the
+ * place within the pixel. */
+static void streaks_saturate_by_their_peaks(void **state) {
+    (void)state;
+    scene s = make_scene_in(test_world(
+        "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+        "]}, \"observers\": [{\"name\": \"neossat\", " TEST_NEOSSAT
+        ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": {\"pixel_scale_arcsec\": 3, "
+        "\"aperture_m\": 0.15, \"psf_fwhm_px\": 4, \"full_well_e\": 100}}]}]}"));
+    const double sigma2 = 16 / (8 * log(2.0)) + 1.0 / 12;
+    static const double ways[][2] = {{0, 0}, {5, 3}, {24, -18}, {100, 40}};
+    int near = 0, flagged = 0;
+    for (int k = 0; k < 4; k++) {
+        s.history->written = 0;
+        push(s.history, 0, turned(s.target, -0.5 * ways[k][0], -0.5 * ways[k][1], 0));
+        push(s.history, 3000, turned(s.target, 0.5 * ways[k][0], 0.5 * ways[k][1], 0));
+        query(&s, 0.0);
+        const double length = hypot(ways[k][0], ways[k][1]), r = sqrt(8 * sigma2);
+        const double peak = length > 0 ? erf(length / r) / (length * sqrt(2 * BST_PI * sigma2))
+                                       : 1 / (2 * BST_PI * sigma2);
+        for (int i = 0; i < s.count; i++) {
+            bst_truth_item item;
+            bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
+            const double ratio = (item.electrons * peak + s.truth.background_e) / 100;
+            if (fabs(log(ratio)) > 0.15) {
+                assert_int_equal((item.flags & BST_TRUTH_SATURATED) != 0, ratio > 1);
+                flagged += ratio > 1;
+                near += fabs(log(ratio)) < 1;
+            }
+        }
+    }
+    assert_true(flagged > 10 && near > 10);
+    free_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sigma_points_have_the_moments_of_the_track),
         cmocka_unit_test(streaks_of_wide_wings_are_as_long_as_they_are),
         cmocka_unit_test(ghosts_are_as_wide_along_both_axes),
+        cmocka_unit_test(backgrounds_are_those_of_the_middle),
+        cmocka_unit_test(oblong_windows_have_their_stars),
+        cmocka_unit_test(streaks_saturate_by_their_peaks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -52,6 +52,15 @@ static void everything(void **state) {
     assert_string_equal(last->objects[0].name, "A");
     bst_assert_close(last->objects[0].end_position_m.z, 6.0, 0.0); /* as written */
     bst_assert_close(bst_frame_updates_item(u, 1)->nodes[1].q_cam_from_gcrf.y, 1.0, 0.0); /* same */
+    /* attitudes at their times: start and end of an exposure of the scenario, of the frame's own */
+    static const double times[2][3] = {{0.0, 0.5}, {0.0, 0.7, 2.0}};
+    for (int k = 0; k < 2; k++) {
+        const bst_frame_update *of = bst_frame_updates_item(u, k);
+        for (int i = 0; i < of->node_count; i++) {
+            bst_assert_close(of->nodes[i].time_s, times[k][i], 0.0); /* as written */
+        }
+    }
+    bst_assert_close(bst_frame_updates_item(u, 0)->nodes[1].q_cam_from_gcrf.x, 0.6, 1e-15);
     double longest, shortest;
     bst_frame_updates_limits(u, &camera, &exposure, &longest, &shortest);
     bst_assert_close(longest, 2.0, 0.0);  /* as written */

@@ -46,6 +46,27 @@ static void keplerian_elements_give_the_orbit(void **state) {
     bst_world_free(world);
 }
 
+/* A state by its numbers, at a time of its own; each of them another. */
+static void a_cartesian_state_gives_the_orbit(void **state) {
+    (void)state;
+    bst_world *world =
+        test_world_with(NUMERICAL
+                        "\"state\": {\"source\": \"cartesian\", \"at_s\": 40, \"position_gcrf_m\": "
+                        "[6.1e6, -3.2e6, 2.3e6], \"velocity_gcrf_mps\": [2500, 6100, 1700]}, "
+                        "\"forces\": {\"gravity\": \"two_body\"}}}",
+                        "");
+    bst_world_view *view = view_of(world);
+    const bst_world_state s = object_at(view, 0, 40);
+    const double want[6] = {6.1e6, -3.2e6, 2.3e6, 2500, 6100, 1700};
+    const double found[6] = {s.position_m.x,   s.position_m.y,   s.position_m.z,
+                             s.velocity_mps.x, s.velocity_mps.y, s.velocity_mps.z};
+    for (int i = 0; i < 6; i++) {
+        bst_assert_close(found[i], want[i], 1e-12 * fabs(want[i])); /* rounding */
+    }
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
 static bst_initial_state_config open_state(double e) {
     return (bst_initial_state_config){.semi_major_axis_m = NAN,
                                       .perigee_radius_m = NAN,
@@ -369,6 +390,7 @@ int main(void) {
         cmocka_unit_test(a_plate_moves_by_its_attitude),
         cmocka_unit_test(forces_without_a_shape_are_refused),
         cmocka_unit_test(keplerian_elements_give_the_orbit),
+        cmocka_unit_test(a_cartesian_state_gives_the_orbit),
         cmocka_unit_test(axis_and_mean_anomaly),
         cmocka_unit_test(element_sets_and_other_objects_start_one_too),
         cmocka_unit_test(the_cue_leaves_burns_out),

@@ -169,9 +169,10 @@ static void other_edges_are_right(void **state) {
  * pixels, whichever corner that is: each pixel has the sky's light or none, by its own distance. */
 static void vignetting_cuts_any_corner(void **state) {
     (void)state;
-    static const double offset[4][2] = {{21, 9}, {-21, 9}, {21, -9}, {-21, -9}};
+    static const double offset[8][2] = {{21, 9},   {-21, 9},   {21, -9},   {-21, -9},
+                                        {149, 99}, {-149, 99}, {149, -99}, {-149, -99}};
     static const double beyond_px[] = {-60, -33, -20, -5, -1.5, 2};
-    for (int corner = 0; corner < 4; corner++) {
+    for (int corner = 0; corner < 8; corner++) {
         const double cx = 149.5 + offset[corner][0], cy = 99.5 + offset[corner][1];
         const double far_px = hypot(fmax(cx, 299 - cx), fmax(cy, 199 - cy));
         for (size_t k = 0; k < sizeof beyond_px / sizeof *beyond_px; k++) {

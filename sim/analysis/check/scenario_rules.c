@@ -189,9 +189,7 @@ static bst_status no_modules(const subject *s) {
 }
 
 static bst_status long_exposure(const subject *s) {
-    bst_loop_timing timing;
     const bst_exposure_config *e = &s->sensor->exposure;
-    bst_loop_timing_of(s->scenario, s->observer, s->number, &timing);
     if (e->exposure_s > e->period_s) {
         bst_log(s->ctx, BST_LOG_WARNING,
                 "%s/exposure: an exposure_s of %g s is longer than the period_s of %g s: exposures "
