@@ -23,7 +23,8 @@ typedef struct bst_view_child_result {
  * Given:     words      words behind the program's name; NULL ends them; up to 12
  *            directory  working folder of the child
  *            text       [bytes] its standard input
- *            limit_s    processor time, and half of the elapsed time, after which it is killed
+ *            limit_s    processor time after which it is killed; so it is after six times as long,
+ *                       as a child that waits, or one on a busy machine
  * Returned:  *out       also when the child failed; free it with bst_view_child_free
  * Errors:    BST_ERR_IO: cannot be started; BST_ERR_MEMORY; BST_ERR_FORMAT: more output than
  *            BST_VIEW_CHILD_BYTES */

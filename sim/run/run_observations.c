@@ -225,8 +225,8 @@ static bst_status add(bst_ctx *ctx, gathering *g, const bst_io_rows *rows) {
         bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
         measure(g, rows, &light, &o->od);
     }
-    o->od.photocentre_factor =
-        bst_od_photocentre_factor_seen(bst_vec3_unit(bodies.sun_m), o->od.direction);
+    o->od.sun = bst_vec3_unit(bodies.sun_m);
+    o->od.photocentre_factor = bst_od_photocentre_factor_seen(o->od.sun, o->od.direction);
     g->track.target = g->track.target || bst_io_rows_int(rows, TARGET) != 0;
     if (g->track.count == 1) {
         g->track.exposure_s =

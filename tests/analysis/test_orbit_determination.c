@@ -226,6 +226,8 @@ static void expect_observations(bool aberrated) {
         bst_assert_close(bst_vec3_angle(d, o->direction), 0, aberrated ? 2e-8 : 1e-12);
         const double phase = bst_vec3_angle(bodies.sun_m, bst_vec3_scale(o->direction, -1.0));
         bst_assert_close(o->photocentre_factor, bst_od_photocentre_factor(phase), 1e-6);
+        bst_assert_close(bst_vec3_angle(o->sun, bodies.sun_m), 0, 1e-6);
+        bst_assert_close(bst_vec3_norm(o->sun), 1, 1e-12);
         double variance = SIGMA_ARCSEC * SIGMA_ARCSEC * BST_ARCSEC_RAD * BST_ARCSEC_RAD;
         bst_assert_close(o->cov_11, variance, 1e-9 * variance);
         bst_assert_close(o->cov_22, variance, 1e-9 * variance);

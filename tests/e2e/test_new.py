@@ -14,6 +14,8 @@ import subprocess
 import unittest
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy
+
 PAIRS = int(sys.argv.pop(2)) if len(sys.argv) > 2 and sys.argv[2].isdigit() else 0
 FIRST = int(sys.argv.pop(2)) if PAIRS and len(sys.argv) > 2 and sys.argv[2].isdigit() else 0
 
@@ -113,6 +115,25 @@ class New(unittest.TestCase):
         self.assertEqual(sensor["camera"]["focal_length_m"], 0.9)
         self.assertEqual(sensor["exposure"]["period_s"], 5)
         self.assertEqual(scenario["duration_s"], 300)
+
+    def test_jitter_is_stated(self):
+        """Image processing knows what the platform's fast jitter, flat between two frequencies, leaves about its mean in an
+        exposure: the variance of sums of waves of random phase over the exposure."""
+        draw = numpy.random.default_rng(1)
+        for more in (), ("--target-tle", "25544"), ("--target-tle", "25544", "--period", "0.05"):
+            path = os.path.join(runs.scratch(), "first.json")
+            made = call("new", path, *more)
+            self.assertEqual(made.returncode, 0, made.stderr)
+            with open(path, encoding="utf-8") as file:
+                sensor = json.load(file)["observers"][0]["sensors"][0]
+            platform, exposure = sensor["modules"]["gimbal"]["platform"], sensor["exposure"]["exposure_s"]
+            # per axis: half of the power; 4,000 waves, each with its own phase
+            waves = draw.uniform(*platform["jitter_high_band_hz"], 4000)[:, None]
+            times = numpy.linspace(0, exposure, 401)
+            values = numpy.cos(2 * numpy.pi * (waves * times + draw.uniform(0, 1, waves.shape)))
+            left = platform["jitter_high_px_rms"] * numpy.sqrt(0.5 * values.var(axis=1).mean() / 0.5)
+            # two digits, and 2 % of the mean over the waves
+            self.assertAlmostEqual(sensor["modules"]["imgproc"]["jitter_px"], left, delta=0.0005 + 0.02 * left)
 
     def test_errors_say_why(self):
         path = os.path.join(runs.scratch(), "first.json")

@@ -26,6 +26,7 @@ import runs
 
 HOSTILE = "<script>alert(1)</script>\"'&\n\u202egnp"
 TARGET = "/world/objects/0"
+PATIENCE_S = 300  # more than the viewer waits for a command of its own on a busy machine
 
 
 def digests(folder):
@@ -61,7 +62,7 @@ class Viewer:
         return self.process.returncode, self.rest + output, errors
 
     def get(self, route):
-        with urllib.request.urlopen(self.url + route, timeout=60) as answer:
+        with urllib.request.urlopen(self.url + route, timeout=PATIENCE_S) as answer:
             return answer.read(), answer.headers
 
     def json(self, route):

@@ -12,8 +12,8 @@ import os
 import re
 import shutil
 import sqlite3
-import tempfile
 import unittest
+import unittest.mock
 import urllib.error
 import urllib.request
 import zlib
@@ -35,9 +35,11 @@ class Editor(test_view.Viewer):
     """A running `boresight view` in a folder of its own, asked as the page asks."""
 
     def __init__(self, run, folder):
+        self.temporary = runs.scratch()  # dropped files and trial runs of other viewers are not in it
         os.chdir(folder)
         try:
-            super().__init__(run)
+            with unittest.mock.patch.dict(os.environ, {"TMPDIR": self.temporary}):
+                super().__init__(run)
         finally:
             os.chdir(ROOT)
 
@@ -46,7 +48,7 @@ class Editor(test_view.Viewer):
         request = urllib.request.Request(f"{self.url}api/editor/{route}", json.dumps(body).encode(),
                                          {"Origin": self.url[:self.url.index("/", 7)]})
         try:
-            with urllib.request.urlopen(request, timeout=60) as answer:
+            with urllib.request.urlopen(request, timeout=test_view.PATIENCE_S) as answer:
                 return answer.status, json.load(answer)
         except urllib.error.HTTPError as error:
             return error.code, error.read().decode()
@@ -61,11 +63,6 @@ class Editor(test_view.Viewer):
 def resolved(*words, folder="."):
     """The scenario as `boresight check` prints it."""
     return json.loads(runs.call("check", *words, cwd=folder).stdout)
-
-
-def scratch_folders():
-    """Folders of dropped files, of this user's viewers."""
-    return {name for name in os.listdir(tempfile.gettempdir()) if name.startswith("boresight-drop-")}
 
 
 def elements(page):
@@ -175,15 +172,13 @@ class Server(unittest.TestCase):
         """A trial run's speed, or why there is none; nothing remains of it."""
         base = os.path.join(self.base, "neossat_geo_stare.json")
         text = json.dumps({"extends": base, "set": {runs.GENERATOR.split("=")[0]: "generator"}})
-        folder = os.environ.get("TMPDIR", "/tmp")
-        before = set(glob.glob(folder + "/boresight-speed-*"))
         found = self.editor.well("speed", text=text, duration_s=2)
         self.assertEqual(found["duration_s"], 2)
         self.assertGreater(found["real_time_factor"], 0)
         self.assertIn("out of range", self.editor.well("speed", text=json.dumps({"extends": base, "set": {PSF: 60}}), duration_s=2)["problem"])
         for wrong in (0, -1, 601, "2", None):
             self.assertEqual(self.editor.post("speed", text=text, duration_s=wrong)[0], 400, wrong)
-        self.assertEqual(set(glob.glob(folder + "/boresight-speed-*")), before)
+        self.assertEqual(os.listdir(self.editor.temporary), [])
 
     def test_save(self):
         """Only into the folder, whole, and over nothing that is there unless asked."""
@@ -213,7 +208,7 @@ class Server(unittest.TestCase):
         """Status and answer for a file."""
         request = urllib.request.Request(f"{self.editor.url}api/editor/file?name={name}", data, {"Origin": self.editor.url[:self.editor.url.index("/", 7)]})
         try:
-            with urllib.request.urlopen(request, timeout=60) as answer:
+            with urllib.request.urlopen(request, timeout=test_view.PATIENCE_S) as answer:
                 return answer.status, json.load(answer)
         except urllib.error.HTTPError as error:
             return error.code, error.read().decode()
@@ -290,7 +285,6 @@ class Server(unittest.TestCase):
         header = fits.Header()
         header.update({"CTYPE1": "RA---TAN", "CTYPE2": "DEC--TAN", "CRPIX1": 11.0, "CRPIX2": 5.0, "CRVAL1": 359.99, "CRVAL2": -20.0, "CD1_1": -1e-3, "CD1_2": 2e-4,
                        "CD2_1": 2e-4, "CD2_2": 1e-3, "EXPTIME": 1.25, "DATE-OBS": "2022-06-16T22:10:00.5", "GAIN": 2.5, "RDNOISE": -3.0})
-        left = scratch_folders()
         buffer = io.BytesIO()
         fits.PrimaryHDU(numpy.zeros((40, 64), "u2"), header).writeto(buffer)
         status, found = self.drop("frame.fits", buffer.getvalue())
@@ -320,7 +314,7 @@ class Server(unittest.TestCase):
             status, answer = self.drop("bad.fits", bad)
             self.assertEqual((status, answer[:8]), (400, "bad.fits"), answer)
             self.assertNotIn("/tmp", answer)
-        self.assertEqual(scratch_folders() - left, set())
+        self.assertEqual(os.listdir(self.editor.temporary), [])
 
     def test_run_starts_only_scenarios(self):
         """No option of the command, no folder, no other file; the reason of a scenario that cannot run comes back."""

@@ -232,6 +232,8 @@ static void measured_and_filtered(void **state) {
             1e-6);
         const double phase = bst_vec3_angle(bodies.sun_m, bst_vec3_scale(o->od.direction, -1.0));
         bst_assert_close(o->od.photocentre_factor, bst_od_photocentre_factor(phase), 1e-6);
+        bst_assert_close(bst_vec3_angle(o->od.sun, bodies.sun_m), 0, 1e-6);
+        bst_assert_close(bst_vec3_norm(o->od.sun), 1, 1e-12);
         bst_assert_close(o->v_mag, 12.5 + k, 0);
         bst_assert_close(o->snr, 30.0 + k, 0);
         expect_measured(bst_knowledge_camera(knowledge), &o->od, k);

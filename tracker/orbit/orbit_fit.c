@@ -344,12 +344,37 @@ static double largest_rate_radps(const work *w, const bst_od_state *s) {
     return bst_vec3_norm(momentum) / (perigee_m * perigee_m);
 }
 
+/* Share of the variance of the photocentre's displacement that remains towards the Sun: the errors
+ * of spheres in arcs of up to 60,000 s are then within the covariance (design choice). */
+static const double SUNWARD = 0.125;
+
+/* Adds an observation to the right-hand side of the normal equations for one standard deviation of
+ * the displacement that stays towards the Sun; returns the share of the variance that is left. */
+static double add_sunward(const work *w, int i, double sigma, double rhs[PARAMETERS]) {
+    const bst_od_observation *o = &w->items[i];
+    const bst_vec3 across = bst_tangent_project(o->direction, o->sun);
+    const double length = bst_vec3_norm(across), *white = w->white[i];
+    if (!(length > 0.0)) {
+        return 1.0;
+    }
+    const bst_tangent axes = bst_tangent_at(o->direction);
+    const double x = bst_vec3_dot(axes.e1, across) / length;
+    const double y = bst_vec3_dot(axes.e2, across) / length, all = sqrt(2.0 * SUNWARD) * sigma;
+    for (int k = 0; k < PARAMETERS && w->used[i]; k++) {
+        rhs[k] += all * (w->slope[i][k][0] * white[0] * x +
+                         w->slope[i][k][1] * (white[1] * x + white[2] * y));
+    }
+    return 1.0 - SUNWARD;
+}
+
 /* Adds the effect of the photocentre's displacement to the covariance, as consider parameters along
- * the axes of GCRF: N^-1 B N^-1 with B the covariance that they give the normal equations. */
+ * the axes of GCRF and, for a part, towards the Sun: N^-1 B N^-1 with B the covariance that they
+ * give the normal equations. */
 static bst_status add_photocentre(const work *w, const bst_od_state *state,
                                   const double l[PARAMETERS][PARAMETERS],
                                   const double size[PARAMETERS], double p[PARAMETERS][PARAMETERS]) {
     double b[PARAMETERS][PARAMETERS], half[PARAMETERS][PARAMETERS], column[PARAMETERS];
+    double sunward[PARAMETERS] = {0.0};
     bst_od_photocentre_effect *items = calloc((size_t)w->count, sizeof *items);
     if (!items) {
         return bst_fail(w->ctx, BST_ERR_MEMORY, "out of memory for %d observations", w->count);
@@ -357,8 +382,9 @@ static bst_status add_photocentre(const work *w, const bst_od_state *state,
     for (int i = 0; i < w->count; i++) {
         const bst_od_observation *o = &w->items[i];
         const double *white = w->white[i];
-        const double sigma =
+        double sigma =
             bst_od_photocentre_rad(w->options->photocentre_m, o->photocentre_factor, w->range_m[i]);
+        sigma *= sqrt(add_sunward(w, i, sigma, sunward));
         const bst_tangent axes = bst_tangent_at(o->direction);
         const double e1[3] = {axes.e1.x, axes.e1.y, axes.e1.z};
         const double e2[3] = {axes.e2.x, axes.e2.y, axes.e2.z};
@@ -373,6 +399,9 @@ static bst_status add_photocentre(const work *w, const bst_od_state *state,
     }
     bst_od_photocentre_covariance(items, w->count, largest_rate_radps(w, state), b);
     free(items);
+    for (int k = 0; k < PARAMETERS * PARAMETERS; k++) {
+        b[k / PARAMETERS][k % PARAMETERS] += sunward[k / PARAMETERS] * sunward[k % PARAMETERS];
+    }
     for (int k = 0; k < PARAMETERS; k++) { /* B is symmetric: its rows are its columns */
         solve(l, size, b[k], half[k]);
     }

@@ -17,6 +17,7 @@ typedef struct bst_od_observation {
      * increases the covariance. */
     double shared_rad[2][2], shared_change;
     double photocentre_factor; /* bst_od_photocentre_factor; 0: not known, taken for 1 */
+    bst_vec3 sun; /* unit, from the Earth, GCRF; 0: not known, the photocentre is off any way */
 } bst_od_observation;
 
 typedef struct bst_od_options {

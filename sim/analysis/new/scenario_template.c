@@ -4,11 +4,15 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "boresight/vec.h"
 #include "sim/analysis/new/reference_sensor.h"
 
 /* From this rate on the line of sight bends within seconds, and an orbit fits what a steady rate
  * does not. */
 #define ORBIT_RATE_ARCSEC_PER_S 100.0
+
+/* Fast jitter of the platform: RMS (radial), and its band, in which its spectrum is flat. */
+static const double JITTER_PX = 0.1, JITTER_LOW_HZ = 5.0, JITTER_HIGH_HZ = 200.0;
 
 /* A JSON string. */
 static void put_text(FILE *f, const char *before, const char *text, const char *after) {
@@ -106,6 +110,20 @@ static void put_cue(FILE *f, const bst_new_request *q, const bst_new_scene *s) {
             isfinite(s->v_mag) ? s->v_mag : 10.0);
 }
 
+/* RMS per axis of the jitter about its mean in an exposure, as imgproc takes it: of the power at a
+ * frequency f the mean over the exposure T keeps the share (sin(pi f T) / (pi f T))^2. */
+static double jitter_in_exposure_px(double exposure_s) {
+    enum { STEPS = 2000 };
+    double kept = 0.0;
+    for (int k = 0; k < STEPS; k++) {
+        const double share = (k + 0.5) / STEPS;
+        const double phase =
+            BST_PI * exposure_s * (JITTER_LOW_HZ + share * (JITTER_HIGH_HZ - JITTER_LOW_HZ));
+        kept += phase > 0.0 ? pow(sin(phase) / phase, 2.0) / STEPS : 1.0 / STEPS;
+    }
+    return JITTER_PX * sqrt(0.5 * (1.0 - kept));
+}
+
 static void put_modules(FILE *f, const bst_new_scene *s) {
     double period = s->period_s;
     double image_s = fmin(0.15, 0.3 * period), tracks_s = fmin(0.2, 0.2 * period),
@@ -129,14 +147,15 @@ static void put_modules(FILE *f, const bst_new_scene *s) {
         "                                \"drift_arcsec_per_s\": [1, -1, 0],\n"
         "                                \"jitter_low_px_rms\": 0.2,\n"
         "                                \"jitter_low_cutoff_hz\": 0.05,\n"
-        "                                \"jitter_high_px_rms\": 0.1,\n"
-        "                                \"jitter_high_band_hz\": [5, 200]\n"
+        "                                \"jitter_high_px_rms\": %.4g,\n"
+        "                                \"jitter_high_band_hz\": [%.4g, %.4g]\n"
         "                            }\n"
         "                        },\n"
         "                        \"scenegen\": {\"type\": \"opencl\"},\n"
         "                        \"imgproc\": {\"type\": \"standard\", \"delay_s\": {\"frame\": "
-        "%.4g}},\n",
-        command_s, image_s);
+        "%.4g}, \"jitter_px\": %.2g},\n",
+        command_s, JITTER_PX, JITTER_LOW_HZ, JITTER_HIGH_HZ, image_s,
+        jitter_in_exposure_px(s->exposure_s));
     fprintf(f,
             "                        \"tracker\": {\"type\": \"ekf\", "
             "\"telemetry_sigma_arcsec\": %.3g%s",

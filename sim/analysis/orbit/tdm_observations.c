@@ -74,8 +74,8 @@ static bst_status complete(bst_ctx *ctx, const bst_tdm_request *q, const sources
         bst_light light = bst_light_at(&bodies, eye->position_m, eye->velocity_mps);
         o->od.direction = bst_light_unaberrate(&light, o->od.direction);
     }
-    o->od.photocentre_factor =
-        bst_od_photocentre_factor_seen(bst_vec3_unit(bodies.sun_m), o->od.direction);
+    o->od.sun = bst_vec3_unit(bodies.sun_m);
+    o->od.photocentre_factor = bst_od_photocentre_factor_seen(o->od.sun, o->od.direction);
     return BST_OK;
 }
 
