@@ -11,6 +11,7 @@ from ctypes import c_void_p
 from typing import Any, Callable, Iterator, List, Tuple
 
 from ._native import LIBRARY, Context
+from ._owned import Owned
 from .errors import BusyError, ClosedError, ForkError
 from .frame import LentCount
 from .model import ModelHandle
@@ -29,18 +30,21 @@ _exiting: List[bool] = []
 atexit.register(_exiting.append, True)
 
 
+def _free(pointer: int, free: Any = LIBRARY.bst_sim_free,
+          exiting: List[bool] = _exiting) -> None:
+    """Frees a bst_sim, unless the process ends."""
+    if not exiting:
+        free(pointer)
+
+
 class SimHandle:
     """A bst_sim; freed when neither a Simulation nor a lent frame refers to it."""
 
     def __init__(self, pointer: int, model: ModelHandle):
         self.pointer, self.model = c_void_p(pointer), model
+        self.owned = Owned(pointer, _free, model.owned)
         self.callbacks: Any = None  # what C may call until the object is freed
         self.plugins: List[Any] = []  # instances of plug-ins in Python
-        self._process, self._free = os.getpid(), LIBRARY.bst_sim_free
-
-    def __del__(self, getpid: Any = os.getpid, exiting: List[bool] = _exiting) -> None:
-        if getpid() == self._process and not exiting:
-            self._free(self.pointer)
 
 
 class Guard:
@@ -65,7 +69,7 @@ class Guard:
         if not self._lock.acquire(blocking=False):
             raise BusyError("the simulation is in use: by another thread, or by the call whose "
                             "callback this is; a simulation is for one thread at a time")
-        if self._handle is None:
+        if self._handle is None or not self._handle.owned.live:
             self._lock.release()
             raise ClosedError("the simulation is closed")
         return self._handle

@@ -1,7 +1,6 @@
 """Frame: the pixels of a frame without a copy, and its metadata."""
 from __future__ import annotations
 
-import os
 from ctypes import byref, c_void_p
 from typing import Any, List
 
@@ -9,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._native import LIBRARY, Context
+from ._owned import Owned
 from ._structs import SimFrame
 from .messages import FrameMessage, Window
 
@@ -23,20 +23,16 @@ class LentPixels:
     It keeps the simulation alive that the frame belongs to.
     """
 
-    def __init__(self, held: int, owner: Any, pointer: int, height: int, width: int,
+    def __init__(self, held: int, owner: Owned, pointer: int, height: int, width: int,
                  lent: "List[LentCount]"):
-        self._held, self._owner = c_void_p(held), owner
-        self._process, self._release = os.getpid(), LIBRARY.bst_sim_release_frame
+        self._owned = Owned(held, LIBRARY.bst_sim_release_frame, owner)
         self._lent = lent[0]
         self._lent.count += 1
         self.__array_interface__ = {"shape": (height, width), "typestr": "<u2",
                                     "data": (pointer, True), "version": 3}
 
-    def __del__(self, getpid: Any = os.getpid) -> None:
-        if getpid() == self._process:
-            self._release(self._held)
-            self._lent.count -= 1
-        self._owner = None
+    def __del__(self) -> None:
+        self._lent.count -= 1
 
 
 class LentCount:
@@ -46,7 +42,7 @@ class LentCount:
         self.count = 0
 
 
-def take_pixels(context: Context, view: SimFrame, owner: Any,
+def take_pixels(context: Context, view: SimFrame, owner: Owned,
                 lent: LentCount) -> npt.NDArray[np.uint16]:
     """Pixels of a frame that bst_sim_view_frame has lent, as a read-only array."""
     held = c_void_p()

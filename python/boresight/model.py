@@ -9,8 +9,9 @@ from typing import Any, Dict, List, Optional, Sequence, Union
 
 from . import _native, _structs
 from ._native import LIBRARY, Context
+from ._owned import Owned
 from .camera import Camera, camera_of
-from .errors import ArgumentError, ForkError
+from .errors import ArgumentError, ClosedError, ForkError
 from .scenario import Scenario
 
 
@@ -19,11 +20,7 @@ class ModelHandle:
 
     def __init__(self, pointer: int):
         self.pointer = c_void_p(pointer)
-        self._process, self._free = os.getpid(), LIBRARY.bst_model_free
-
-    def __del__(self, getpid: Any = os.getpid) -> None:
-        if getpid() == self._process:
-            self._free(self.pointer)
+        self.owned = Owned(pointer, LIBRARY.bst_model_free)
 
 
 class Model:
@@ -55,6 +52,8 @@ class Model:
         if os.getpid() != self._process:
             raise ForkError("this model belongs to the process from which this one was forked: "
                             "create it here, or start processes with the method \"spawn\"")
+        if not self._handle.owned.live:
+            raise ClosedError("the garbage collector has freed this model")
         return self._handle
 
     def prepare(self) -> "Model":

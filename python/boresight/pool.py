@@ -13,6 +13,7 @@ import numpy.typing as npt
 from . import _structs
 from ._handle import Interrupt, SimHandle
 from ._native import LIBRARY, Context, integer_argument, number_argument, text_argument
+from ._owned import Owned
 from .commands import COMMANDS
 from .errors import ArgumentError, BusyError, ClosedError, ForkError
 from .messages import CHANNELS
@@ -46,12 +47,9 @@ class Pool:
         self._context, pointer = Context(), c_void_p()
         self._context.check(LIBRARY.bst_sim_pool_create(self._context.pointer, number,
                                                         byref(pointer)))
-        self._pointer, self._process = pointer, os.getpid()
-        self._free, self._lock = LIBRARY.bst_sim_pool_free, threading.Lock()
-
-    def __del__(self, getpid: Any = os.getpid) -> None:
-        if getattr(self, "_process", None) == getpid():
-            self._free(self._pointer)
+        assert pointer.value
+        self._pointer, self._owned = pointer, Owned(pointer.value, LIBRARY.bst_sim_pool_free)
+        self._process, self._lock = os.getpid(), threading.Lock()
 
     @contextlib.contextmanager
     def hold(self, simulations: Sequence[Optional[Simulation]]) -> Iterator["Held"]:
@@ -65,6 +63,8 @@ class Pool:
         for simulation in simulations:
             if simulation is not None and not isinstance(simulation, Simulation):
                 raise ArgumentError(f"hold takes simulations, not {type(simulation).__name__}")
+        if not self._owned.live:
+            raise ClosedError("the garbage collector has freed this pool")
         if not self._lock.acquire(blocking=False):
             raise BusyError("the pool is in use: one block at a time")
         guards = [s._guard for s in simulations if s is not None]
@@ -73,7 +73,8 @@ class Pool:
         try:
             for guard in guards:
                 taken.append(guard.take())
-            held = Held(self._context, self._pointer, simulations, taken)
+            held = Held(self._context, self._pointer, simulations, taken,
+                        Owned(0, _nothing, self._owned, *(h.owned for h in taken)))
             yield held
         finally:
             if held is not None:
@@ -81,6 +82,10 @@ class Pool:
             for guard, _ in zip(guards, taken):
                 guard.give_back()
             self._lock.release()
+
+
+def _nothing(_address: int) -> None:
+    """Frees a use that has no C object of its own."""
 
 
 class Held:
@@ -91,8 +96,9 @@ class Held:
     """
 
     def __init__(self, context: Context, pool: c_void_p,
-                 simulations: Sequence[Optional[Simulation]], handles: List[SimHandle]):
-        self._context, self._pool = context, pool
+                 simulations: Sequence[Optional[Simulation]], handles: List[SimHandle],
+                 uses: Owned):
+        self._context, self._pool, self._uses = context, pool, uses
         self._held, self._handles = [s for s in simulations if s is not None], handles
         self._count = len(simulations)
         self._lock, self._open = threading.Lock(), True
@@ -112,7 +118,7 @@ class Held:
             raise BusyError("the simulations are in use: by another thread, or by the call whose "
                             "callback this is")
         try:
-            if not self._open:
+            if not self._open or not self._uses.live:
                 raise ClosedError("the block in which the pool held these simulations has ended")
             yield
         finally:

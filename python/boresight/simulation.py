@@ -262,7 +262,7 @@ class Simulation(ChannelViews):
         if not view.message:
             return None
         where = scope or self._first_scope("frame")
-        data = take_pixels(context, view, sim, self._guard.lent)
+        data = take_pixels(context, view, sim.owned, self._guard.lent)
         message = message_at("frame", view.message, where, -1, -1)
         assert isinstance(message, FrameMessage)
         return Frame(data, message, where, self.tick_rate_hz)
