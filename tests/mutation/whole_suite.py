@@ -22,7 +22,7 @@ import shutil
 import sys
 import tempfile
 
-from every_function import FUNCTION, Function, Library, asks_for, passes
+from every_function import FUNCTION, Function, Library, passes
 from mutate import blank_comments, wilson
 from quick_tree import QuickTree
 
