@@ -158,6 +158,17 @@ class Judge:
         half = len(bugs) // 2
         return self.among(command, seconds, bugs[:half]) + self.among(command, seconds, bugs[half:])
 
+    def apart(self, bugs):
+        """Sets of bugs that can act together: of those of one function only the first would act."""
+        parts = []
+        for number in bugs:
+            function = self.library.bugs[number][0]
+            part = next((p for p in parts if all(self.library.bugs[n][0] is not function for n in p)), None)
+            if part is None:
+                parts.append(part := [])
+            part.append(number)
+        return parts
+
     def run(self, name, command, longest, together):
         """Runs a test without a bug, and with those that it enters and that are left."""
         if name in self.done or not self.alive():
@@ -175,7 +186,7 @@ class Judge:
         self.done[name] = {"sound": sound, "seconds": round(spent, 2), "entered": sorted(entered)}
         if sound:
             left = sorted(entered & self.alive())
-            for part in [left] if together else [[n] for n in left]:
+            for part in self.apart(left) if together else [[n] for n in left]:
                 for number in self.among(command, spent, part):
                     self.noticed[number] = name
                     print(f"noticed {number} {self.library.bugs[number][1]['file']} by {name}", flush=True)
