@@ -65,24 +65,27 @@ class Columns:
         return text
 
     def put_text(self, name, text):
-        """A text: its numbers and times are values of their own, the rest is a value with # for each."""
+        """A text: its numbers are values of their own, its times of other columns, the rest is a value with # and @ for them."""
         if is_own(name):
             return
         text = self.without_roots(text)
-        numbers = []
+        moments = []
 
         def moment_of(match):
             value = moment(match)
             if value is not None:
-                numbers.append(value)
+                moments.append(value)
             return "@"
         rest = MOMENT.sub(moment_of, text)
-        numbers += [float(v) for v in NUMBER.findall(rest)]
+        numbers = [float(v) for v in NUMBER.findall(rest)]
         rest = NUMBER.sub("#", rest)
         if rest not in ("#", "@"):
             self.columns.setdefault(name + "~", []).append(rest)
         for v in numbers:
             self.columns.setdefault(name, []).append(v)
+        for v in moments:  # since the first one of the column: what is of the size of a run is seen
+            first = self.columns.setdefault(name + "@", [v])[0]
+            self.columns.setdefault(name + "@ since", []).append(v - first)
 
     def put_value(self, name, value):
         if isinstance(value, bool):
