@@ -430,9 +430,9 @@ static void off_and_without_objects(void **state) {
     bst_world_free(world);
 }
 
-/* A drift that wanders, by a variance of n^2 a day, displaces an object after T days by a variance
- * of n^2 T^3 / 3 along its orbit, without any update. */
-static void drifts_wander_until_the_end(void **state) {
+/* A drift that is a random walk, with a variance of n^2 a day, displaces an object after T days by
+ * a variance of n^2 T^3 / 3 along its orbit, without any update. */
+static void drifts_are_random_walks(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     const double days = 1.5, noise[2] = {0.0, 3000.0};
@@ -457,7 +457,7 @@ static void drifts_wander_until_the_end(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(drifts_wander_until_the_end),
+        cmocka_unit_test(drifts_are_random_walks),
         cmocka_unit_test(tracks_update_their_objects),
         cmocka_unit_test(saved_states_go_on),
         cmocka_unit_test(a_track_is_used_once),
