@@ -132,10 +132,9 @@ static double gap_px(const bst_error_budget_source *a, int a_nodes,
             double u = (double)i / (NODES - 1), v = (double)k / (NODES - 1);
             double c = cos(0.5 * BST_PI * u), s = sin(0.5 * BST_PI * u);
             double d = cos(0.5 * BST_PI * v), t = sin(0.5 * BST_PI * v);
-            double x = c * (double)a->x_px - s * (double)a->y_px - d * (double)b->x_px +
-                       t * (double)b->y_px;
-            double y = s * (double)a->x_px + c * (double)a->y_px + shift_px * u -
-                       t * (double)b->x_px - d * (double)b->y_px - shift_px * v;
+            double p = (double)a->x_px, q = (double)a->y_px, r = (double)b->x_px;
+            double x = c * p - s * q - d * r + t * (double)b->y_px;
+            double y = s * p + c * q - t * r - d * (double)b->y_px + shift_px * (u - v);
             least = fmin(least, hypot(x, y));
         }
     }
@@ -143,14 +142,12 @@ static double gap_px(const bst_error_budget_source *a, int a_nodes,
 }
 
 /* Sources of unequal numbers of blocks on paths that are no circles, whose places differ along both
- * axes: those near each other add in whole, others do not, by all pairs of their nodes. */
+ * axes: those near each other add in whole, others do not, by all pairs of their nodes. Of the
+ * first and the last pair one of the second blocks meets the other path, and no first one does. */
 static void paths_meet_by_their_nodes(void **state) {
     fixture *f = *state;
     const double shift_px = 50.0;
-    const float places[][2][2] = {{{40.0F, 0.0F}, {20.0F, -34.6F}},
-                                  {{40.0F, 0.0F}, {34.0F, 21.0F}},
-                                  {{40.0F, 0.0F}, {36.0F, -60.0F}},
-                                  {{-25.0F, 30.0F}, {10.0F, 62.0F}}};
+    const float places[][2] = {{6.0F, -31.0F}, {32.0F, -19.0F}, {41.0F, 36.0F}, {-38.0F, -47.0F}};
     int near = 0, far = 0;
     for (int n = 0; n < NODES; n++) {
         f->table[n / BST_BLOCK * BST_TABLE_ROWS * BST_BLOCK + n % BST_BLOCK + 5 * BST_BLOCK] =
@@ -168,8 +165,8 @@ static void paths_meet_by_their_nodes(void **state) {
         bst_error_budget_begin(f->budget, &motion);
         for (int i = 0; i < 2; i++) {
             double error_e = DARK_E * (i ? 0.4 : 0.5);
-            s[i] = (bst_error_budget_source){.x_px = places[c / 2][i][0],
-                                             .y_px = places[c / 2][i][1],
+            s[i] = (bst_error_budget_source){.x_px = i ? places[c / 2][0] : (float)RADIUS_PX,
+                                             .y_px = i ? places[c / 2][1] : 0.0F,
                                              .nodes_e = (float)error_e,
                                              .predicted_e = (float)error_e};
             f->sources[i] = (bst_kernel_source_record){
