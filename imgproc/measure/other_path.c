@@ -11,6 +11,9 @@ enum { NODES = 33 };
 /* A path is another one if chi-square says so at 5 sigma, and its ends are so far apart: what the
  * roll of the camera changes in a field is less. */
 static const double LEAST_GAIN = 25.0, LEAST_OTHER_PX = 0.3;
+/* Two stars in one image look like a longer streak where theirs are shorter than four FWHM: there
+ * only what is three times as long as wide has another path. */
+static const double SHORT_FWHM = 4.0, LONG_SHARE = 3.0;
 /* Moments of a star's streak that are fitted again: by how much their path differs, px and share of
  * the star's. */
 static const double MOMENTS_PX = 1.0, MOMENTS_SHARE = 0.05;
@@ -145,8 +148,14 @@ void bst_other_path_judge(const bst_imgproc_worker *w, int i, bst_imgproc_found 
     bst_peak_centroid_star_path(w->f, &shape);
     const double star[2] = {shape.dx_px, shape.dy_px};
     const bool own = found->own_streak || found->own_path;
+    const bool brief =
+        hypot(star[0], star[1]) < SHORT_FWHM * BST_FWHM_PER_SIGMA * w->l->profiles.sigma_px;
+    if (brief && (found->length_px <= LONG_SHARE * found->width_px || !own)) {
+        return;
+    }
     if (!found->streak || (own && is_other(w, i, found, star)) ||
-        (!w->f->uneven && (own || is_suspicious(w, found, star)) && refit(w, i, found, star))) {
+        (!brief && !w->f->uneven && (own || is_suspicious(w, found, star)) &&
+         refit(w, i, found, star))) {
         found->flags |= BST_DETECTION_OTHER_PATH;
     }
 }
