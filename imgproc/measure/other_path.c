@@ -11,9 +11,9 @@ enum { NODES = 33 };
 /* A path is another one if chi-square says so at 5 sigma, and its ends are so far apart: what the
  * roll of the camera changes in a field is less. */
 static const double LEAST_GAIN = 25.0, LEAST_OTHER_PX = 0.3;
-/* Two stars in one image: tolerance and largest trace of the moments of their separation, squares
- * of the PSF's sigma (4 sigma apart, and what a fit of one streak adds). */
-static const double TWO_TOLERANCE = 0.25, TWO_MOST = 8.0;
+/* Two stars in one image look like a longer streak where theirs are shorter than four FWHM: there
+ * only what is three times as long as wide has another path. */
+static const double SHORT_FWHM = 4.0, LONG_SHARE = 3.0;
 /* Moments of a star's streak that are fitted again: by how much their path differs, px and share of
  * the star's. */
 static const double MOMENTS_PX = 1.0, MOMENTS_SHARE = 0.05;
@@ -61,25 +61,12 @@ static bst_imgproc_source fit_path(const bst_imgproc_worker *w, int i, bst_imgpr
     return found->source;
 }
 
-/* True if the second moments of a streak are those of stars' streaks and a separation of two of
- * them, p (1 - p) s s^T for shares of light p and 1 - p, that is too small to be seen: nothing then
- * tells two stars whose streaks join from one streak. */
-static bool may_be_two(const bst_imgproc_worker *w, const bst_imgproc_source *own,
-                       const double star[2]) {
-    const double sigma = w->l->profiles.sigma_px, dx = own->shape.dx_px, dy = own->shape.dy_px;
-    const double wider = fmax(own->widening_px2, 0.0) + TWO_TOLERANCE * sigma * sigma;
-    const double xx = (dx * dx - star[0] * star[0]) / 12.0 + wider;
-    const double yy = (dy * dy - star[1] * star[1]) / 12.0 + wider;
-    const double xy = (dx * dy - star[0] * star[1]) / 12.0;
-    return xx + yy > 0.0 && xx * yy >= xy * xy && xx + yy < TWO_MOST * sigma * sigma;
-}
-
 /* True if a source's path explains its pixels, and that of stars does not. */
 static bool is_other(const bst_imgproc_worker *w, int i, const bst_imgproc_found *found,
                      const double star[2]) {
     const bst_imgproc_shape *s = &found->source.shape;
     const double own[2] = {s->dx_px, s->dy_px};
-    if (apart_px(own, star) < LEAST_OTHER_PX || may_be_two(w, &found->source, star)) {
+    if (apart_px(own, star) < LEAST_OTHER_PX) {
         return false;
     }
     bst_imgproc_source longest = found->source;
@@ -161,8 +148,14 @@ void bst_other_path_judge(const bst_imgproc_worker *w, int i, bst_imgproc_found 
     bst_peak_centroid_star_path(w->f, &shape);
     const double star[2] = {shape.dx_px, shape.dy_px};
     const bool own = found->own_streak || found->own_path;
+    const bool brief =
+        hypot(star[0], star[1]) < SHORT_FWHM * BST_FWHM_PER_SIGMA * w->l->profiles.sigma_px;
+    if (brief && (found->length_px <= LONG_SHARE * found->width_px || !own)) {
+        return;
+    }
     if (!found->streak || (own && is_other(w, i, found, star)) ||
-        (!w->f->uneven && (own || is_suspicious(w, found, star)) && refit(w, i, found, star))) {
+        (!brief && !w->f->uneven && (own || is_suspicious(w, found, star)) &&
+         refit(w, i, found, star))) {
         found->flags |= BST_DETECTION_OTHER_PATH;
     }
 }

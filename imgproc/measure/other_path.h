@@ -11,7 +11,6 @@
  * Given:     found  fitted, with flags and moments
  * Notes:     A star's streak whose moments have another length or direction is fitted with a path
  *            of its own first, and keeps that if it is another one.
- *            One whose moments are those of two stars' streaks that join is a star's.
  *            Points that are longer than the PSF are no stars.
  *            Blended, saturated and cut sources and those below BST_EXTENT_SNR are not judged. */
 void bst_other_path_judge(const bst_imgproc_worker *worker, int i, bst_imgproc_found *found);
