@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from ctypes import byref, c_void_p
-from typing import Any, List
+from typing import Any, List, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -23,9 +23,10 @@ class LentPixels:
     It keeps the simulation alive that the frame belongs to.
     """
 
-    def __init__(self, held: int, owner: Owned, pointer: int, height: int, width: int,
+    def __init__(self, held: int, owner: Optional[Owned], pointer: int, height: int, width: int,
                  lent: "List[LentCount]"):
-        self._owned = Owned(held, LIBRARY.bst_sim_release_frame, owner)
+        self._owned = Owned(held, LIBRARY.bst_sim_release_frame,
+                            *(() if owner is None else (owner,)))
         self._lent = lent[0]
         self._lent.count += 1
         self.__array_interface__ = {"shape": (height, width), "typestr": "<u2",
@@ -42,7 +43,7 @@ class LentCount:
         self.count = 0
 
 
-def take_pixels(context: Context, view: SimFrame, owner: Owned,
+def take_pixels(context: Context, view: SimFrame, owner: Optional[Owned],
                 lent: LentCount) -> npt.NDArray[np.uint16]:
     """Pixels of a frame that bst_sim_view_frame has lent, as a read-only array."""
     held = c_void_p()

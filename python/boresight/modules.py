@@ -325,7 +325,7 @@ class StepInfo:
         self.context.check(handle.ops[0].map(handle.owner, self.context.pointer, byref(pointer)))
         view = SimFrame(payload, pointer, handle.width, handle.height)
         owner = self.owner()
-        data = take_pixels(self.context, view, owner, self.lent)
+        data = take_pixels(self.context, view, owner and owner.owned, self.lent)
         if owner is None:  # in a command of the program, which keeps nothing for longer
             data = data.copy()
             data.setflags(write=False)

@@ -63,11 +63,11 @@ static const char *name_of(const bst_link *link, int peer) {
 /* Counts an invalid message and sends an `error` to its sender. */
 static void reject_message(bst_link *link, link_exchange *x, const message *m, int peer, int event,
                            const char *fault, const char *text) {
-    int64_t sequence = m->header.type == BST_LINK_TYPES ? -1 : m->header.sequence;
     bst_link_event(link, x->ctx, event, "%s: %s", name_of(link, peer), text);
     if (x->replies < LINK_REPLIES) {
         x->replies++;
-        bst_link_reply(link, &m->id, peer >= 0 ? &link->peers[peer] : NULL, fault, sequence, text);
+        bst_link_reply(link, &m->id, peer >= 0 ? &link->peers[peer] : NULL, fault,
+                       m->header.sequence, text);
     }
 }
 
@@ -351,7 +351,7 @@ static bool is_heard(bst_link *link, const link_exchange *x, int p) {
 
 /* Reads the header of a message and checks that it is for the simulation. */
 static bst_wire_fault read_header(bst_ctx *why, message *m) {
-    m->header.type = BST_LINK_TYPES;
+    m->header = (bst_link_header){.type = BST_LINK_TYPES, .sequence = -1};
     if (m->count < 2) {
         bst_fail(why, BST_ERR_FORMAT, "a message has a header and a payload; this has neither");
         return BST_WIRE_BAD_LENGTH;
@@ -395,9 +395,11 @@ static void take_message(bst_link *link, link_exchange *x, message *m) {
                            "this peer plays no part now: say hello (again)");
             return;
         }
-        if (!in_order(link, x, m, p)) {
-            return;
-        }
+    }
+    /* a rejected message uses up its number, so far as that can be read */
+    bool numbered = m->header.type != BST_LINK_HELLO && m->header.sequence >= 0;
+    if (numbered && p >= 0 && plays_any(link, p) && !in_order(link, x, m, p)) {
+        return;
     }
     if (fault == BST_WIRE_GOOD) {
         fault = check_parts(&why, m);

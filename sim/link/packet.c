@@ -231,7 +231,7 @@ static bst_wire_fault fault(bst_ctx *ctx, bst_wire_fault kind, const char *why) 
 
 bst_wire_fault bst_link_header_read(bst_ctx *ctx, const char *bytes, size_t count,
                                     bst_link_header *out) {
-    *out = (bst_link_header){.type = BST_LINK_TYPES, .step = -1, .slot = -1};
+    *out = (bst_link_header){.type = BST_LINK_TYPES, .sequence = -1, .step = -1, .slot = -1};
     if (count < ENDING_BYTES + 1 || count > BST_LINK_HEADER_BYTES ||
         memcmp(bytes + count - ENDING_BYTES, ending, sizeof ending - 1) != 0) {
         return fault(ctx, BST_WIRE_BAD_HEADER,
@@ -261,6 +261,7 @@ bst_wire_fault bst_link_header_read(bst_ctx *ctx, const char *bytes, size_t coun
     } while (!t.bad && take(&t, ','));
     need(&t, '}');
     if (t.bad || t.at != t.end) {
+        out->sequence = -1;
         return fault(ctx, BST_WIRE_BAD_HEADER,
                      "it is no flat JSON object of the members that docs/reference/icd.md lists");
     }

@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 import sqlite3
+import struct
 import subprocess
 import sys
 import unittest
@@ -88,6 +89,14 @@ class Plugins(unittest.TestCase):
     def check(self, *sets, code=0):
         return self.call("check", self.scenario, "--set", "/world/star_catalogue=embedded",
                          *(word for one in sets for word in ("--set", one)), code=code)
+
+    @staticmethod
+    def segments(elf):
+        """End of the last segment of an ELF of 64 bits that the dynamic linker maps (PT_LOAD)."""
+        at, size, count = (struct.unpack_from(f"<{kind}", elf, offset)[0]
+                           for kind, offset in (("Q", 32), ("H", 54), ("H", 56)))
+        parts = [struct.unpack_from("<IIQQQQ", elf, at + k * size) for k in range(count)]
+        return max(offset + length for kind, _, offset, _, _, length in parts if kind == 1)
 
     def digest(self, name):
         with open(os.path.join(self.work, name), "rb") as file:
@@ -192,6 +201,18 @@ class Plugins(unittest.TestCase):
                 (f'{M}/imgproc={{"type": "standard", "track_windows": true, "detector": '
                  f'{{"plugin": "box_detector.so"}}}}', "turn track_windows, stack and extended off")):
             self.assertRegex(self.check(setting, code=1), message)
+        # the dynamic linker would map what a file that is cut short lacks, and the process end
+        with open(os.path.join(self.work, "stare_at.so"), "rb") as file:
+            whole = file.read()
+        segments = self.segments(whole)
+        for size, message in ((3, "cannot be loaded"), (4, "has 4 bytes, its headers need 64;"),
+                              (63, "cut short: it has 63 bytes, its headers need 64;"),
+                              (100, "cut short: it has 100 bytes, its headers need"),
+                              (4000, f"it has 4000 bytes, its headers need {segments}; build"),
+                              (segments - 1, f"{segments - 1} bytes, its headers need {segments}")):
+            with open(os.path.join(self.work, "cut.so"), "wb") as file:
+                file.write(whole[:size])
+            self.assertRegex(self.check(f'{control}={{"plugin": "cut.so"}}', code=1), message)
         # a detector that gives nonsense ends the run, and is named
         self.assertRegex(self.call(
             "run", self.scenario, "--out", "mad", "--quiet", "--duration", "2", "--set",

@@ -1,4 +1,4 @@
-/* Length of a library as its headers state it, which tells one that is cut short. */
+/* Length of a library as its headers state it, by which a file that is cut short is refused. */
 #ifndef BST_ENGINE_SCENARIO_ELF_EXTENT_H
 #define BST_ENGINE_SCENARIO_ELF_EXTENT_H
 

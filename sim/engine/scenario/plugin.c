@@ -9,6 +9,7 @@
 
 #include "boresight/stages.h"
 #include "boresight/version.h"
+#include "sim/engine/scenario/elf_extent.h"
 
 /* Checks the interface version and the ports of a plug-in's modules. */
 static bst_status check_modules(bst_ctx *ctx, const bst_plugin *plugin) {
@@ -96,6 +97,9 @@ bst_status bst_plugin_open(bst_ctx *ctx, const char *path, bst_plugin *out) {
     snprintf(out->file, sizeof out->file, "%s", full);
     free(full);
     if (bst_sha256_file(ctx, out->file, out->sha256) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_IO, "plug-in");
+    }
+    if (bst_elf_check_extent(ctx, out->file) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_IO, "plug-in");
     }
     void *library = dlopen(out->file, RTLD_NOW | RTLD_LOCAL);

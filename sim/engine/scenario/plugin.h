@@ -20,9 +20,9 @@ typedef struct bst_plugin {
 } bst_plugin;
 
 /* Loads a plug-in; it remains loaded until the process ends. BST_ERR_NOT_FOUND: no such file;
- * BST_ERR_IO: it cannot be loaded. BST_ERR_CONFIG: it defines neither list, is linked with another
- * version of libboresight, or has an unknown interface version or kind of stage. Messages name the
- * file and the remedy. */
+ * BST_ERR_IO: it cannot be loaded, or is cut short. BST_ERR_CONFIG: it defines neither list, is
+ * linked with another version of libboresight, or has an unknown interface version or kind of
+ * stage. Messages name the file and the remedy. */
 bst_status bst_plugin_open(bst_ctx *ctx, const char *path, bst_plugin *out) BST_MUST_CHECK;
 
 /* Checks interface versions, functions and kinds of a plug-in's lists. BST_ERR_CONFIG. */
