@@ -2,6 +2,7 @@
 tables that a run of hours would have."""
 import json
 import os
+import re
 import shutil
 import sqlite3
 import urllib.error
@@ -109,6 +110,12 @@ def stretched(k, out):
         db.execute(f"INSERT INTO control ({', '.join(keys)}) VALUES ({', '.join('?' * len(keys))})", [row[key] for key in keys])
     db.commit()
     db.close()
+    for name in ("scenario.json", "manifest.json"):
+        path = os.path.join(folder, name)
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(re.sub(r'"duration_s":\s*9\b(\.0)?', f'"duration_s": {REPEATS * span_s * SLOWER}', text))
     k.call("slow info", "info", folder)
     k.call("slow report", "report", folder, "--out", k.path("slow.html"), adds=[k.path("slow.html")])
     k.view("slow", folder, *(f"api/plot?sensor={s}&panel={p}&from=431&to=3025&columns=40" for s in (0, 2) for p in PANELS),
