@@ -3,7 +3,7 @@
 # the longest first, so that none is left at the end for one core alone; a clean clone has no times
 # of its own. Only the order counts; a test that is not named counts as short.
 set(bst_costs
-  e2e_docs_commands 42  e2e_figures_kept 42  scenegen_renderer 35  scenegen_colour 29  e2e_study 24  e2e_link 23
+  e2e_docs_commands 42  e2e_figures_kept 100  scenegen_renderer 35  scenegen_colour 29  e2e_study 24  e2e_link 23
   e2e_knowledge 21  e2e_discrimination 20  scenegen_fourier_render 19  e2e_resume 18
   e2e_faults 17  e2e_detector_effects 16  scenegen_detector 15  e2e_interrupted 20
   e2e_command_line 15  scenegen_tolerance_sweep 14  scenegen_fidelity 14  e2e_slurm 35
