@@ -20,7 +20,7 @@ extern char **environ;
 enum { WORDS_MOST = 12 };
 /* Time between two looks at the child, s: doubled each time, up to the second one. */
 static const double FIRST_WAIT_S = 1e-3, LONGEST_WAIT_S = 0.02;
-/* Elapsed time over processor time of the limit: where ten others share a processor. */
+/* Elapsed time over processor time of the limit: others may share the processors. */
 static const double PATIENCE = 6.0;
 
 /* Files in memory that are the child's standard input, output and error. */
