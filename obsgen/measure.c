@@ -2,12 +2,8 @@
 
 #include "obsgen/generator_internal.h"
 #include "obsgen/model/place_error.h"
+#include "sim/onboard/other_path.h"
 
-/* From which difference images find that a streak has another path than the stars', px, share of
- * theirs, and gain of chi-square (imgproc/measure/other_path.c). */
-static const double OTHER_PX = 1.0, OTHER_SHARE = 0.05, OTHER_GAIN = 25.0;
-/* Where the stars' streaks are shorter, FWHM, what is so much longer than wide has another path. */
-static const double SHORT_FWHM = 4.0, LONG_SHARE = 3.0;
 /* Lower limit of the visible share used for errors. */
 static const double LEAST_SEEN = 0.02;
 /* Draws of a point's error until its maximum exceeds the threshold, and their number's place in
@@ -290,14 +286,13 @@ static bool is_of_other_path(const bst_generator *g, const generator_source *s, 
         return false;
     }
     const bst_obsgen_path_px *own = &s->path, *stars = &g->straight_path;
-    const double apart = fmin(hypot(own->dx - stars->dx, own->dy - stars->dy),
-                              hypot(own->dx + stars->dx, own->dy + stars->dy));
-    if (g->streak < SHORT_FWHM * BST_FWHM_PER_SIGMA * g->fitted_sigma) {
-        return !as_streak && d->length_px > LONG_SHARE * d->width_px;
+    if (g->streak < BST_OTHER_PATH_SHORT_FWHM * BST_FWHM_PER_SIGMA * g->fitted_sigma) {
+        return !as_streak && d->length_px > BST_OTHER_PATH_LONG_SHARE * d->width_px;
     }
+    const double apart = bst_paths_apart_px(own->dx, own->dy, stars->dx, stars->dy);
     const double same = bst_matched_efficiency(*own, *stars, g->total_sigma);
-    return !as_streak || (apart > OTHER_PX + OTHER_SHARE * g->streak &&
-                          (1.0 - same * same) * d->snr * d->snr > OTHER_GAIN);
+    return !as_streak || (apart > BST_OTHER_PATH_PX + BST_OTHER_PATH_SHARE * g->streak &&
+                          (1.0 - same * same) * d->snr * d->snr > BST_OTHER_PATH_GAIN);
 }
 
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,

@@ -5,23 +5,13 @@
 
 #include "imgproc/measure/peak_centroid.h"
 #include "imgproc/measure/source_moments.h"
+#include "sim/onboard/other_path.h"
 
 /* nodes of a path */
 enum { NODES = 33 };
-/* A path is another one if chi-square says so at 5 sigma, and its ends are so far apart: what the
- * roll of the camera changes in a field is less. */
-static const double LEAST_GAIN = 25.0, LEAST_OTHER_PX = 0.3;
-/* Two stars in one image look like a longer streak where theirs are shorter than four FWHM: there
- * only what is three times as long as wide has another path. */
-static const double SHORT_FWHM = 4.0, LONG_SHARE = 3.0;
-/* Moments of a star's streak that are fitted again: by how much their path differs, px and share of
- * the star's. */
-static const double MOMENTS_PX = 1.0, MOMENTS_SHARE = 0.05;
-
-/* Distance between two paths, end minus start, either way round. */
-static double apart_px(const double a[2], const double b[2]) {
-    return fmin(hypot(a[0] - b[0], a[1] - b[1]), hypot(a[0] + b[0], a[1] + b[1]));
-}
+/* The ends of another path are so far apart: what the roll of the camera changes in a field is
+ * less. */
+static const double LEAST_OTHER_PX = 0.3;
 
 /* Length that moments have of a uniform streak of a star, px: a Gaussian window of twice its
  * covariance weighs the ends least (bst_fit_moments). */
@@ -44,10 +34,10 @@ static double length_of_star(const bst_imgproc_worker *w, const bst_imgproc_foun
 static bool is_suspicious(const bst_imgproc_worker *w, const bst_imgproc_found *found,
                           const double star[2]) {
     const double path = hypot(star[0], star[1]), expected = length_of_star(w, found, path);
-    const double own[2] = {found->length_px * cos(found->angle_rad),
-                           found->length_px * sin(found->angle_rad)};
-    const double theirs[2] = {star[0] / path * expected, star[1] / path * expected};
-    return apart_px(own, theirs) > MOMENTS_PX + MOMENTS_SHARE * expected;
+    const double apart = bst_paths_apart_px(found->length_px * cos(found->angle_rad),
+                                            found->length_px * sin(found->angle_rad),
+                                            star[0] / path * expected, star[1] / path * expected);
+    return apart > BST_OTHER_PATH_PX + BST_OTHER_PATH_SHARE * expected;
 }
 
 /* The fit of a source with a path, on a stamp; chi-square is infinite if it fails. */
@@ -66,7 +56,7 @@ static bool is_other(const bst_imgproc_worker *w, int i, const bst_imgproc_found
                      const double star[2]) {
     const bst_imgproc_shape *s = &found->source.shape;
     const double own[2] = {s->dx_px, s->dy_px};
-    if (apart_px(own, star) < LEAST_OTHER_PX) {
+    if (bst_paths_apart_px(own[0], own[1], star[0], star[1]) < LEAST_OTHER_PX) {
         return false;
     }
     bst_imgproc_source longest = found->source;
@@ -78,7 +68,7 @@ static bool is_other(const bst_imgproc_worker *w, int i, const bst_imgproc_found
     trial.source = found->source;
     const bst_imgproc_source theirs = fit_path(w, i, &trial, &stamp, star);
     const double free = mine.pixels, left = mine.chi_square - free - 2.0 * sqrt(2.0 * free);
-    return theirs.chi_square - mine.chi_square > LEAST_GAIN + fmax(left, 0.0);
+    return theirs.chi_square - mine.chi_square > BST_OTHER_PATH_GAIN + fmax(left, 0.0);
 }
 
 /* Lowest chi-square along a line of paths: a parabola through three of them. */
@@ -148,9 +138,9 @@ void bst_other_path_judge(const bst_imgproc_worker *w, int i, bst_imgproc_found 
     bst_peak_centroid_star_path(w->f, &shape);
     const double star[2] = {shape.dx_px, shape.dy_px};
     const bool own = found->own_streak || found->own_path;
-    const bool brief =
-        hypot(star[0], star[1]) < SHORT_FWHM * BST_FWHM_PER_SIGMA * w->l->profiles.sigma_px;
-    if (brief && (found->length_px <= LONG_SHARE * found->width_px || !own)) {
+    const double fwhm_px = BST_FWHM_PER_SIGMA * w->l->profiles.sigma_px;
+    const bool brief = hypot(star[0], star[1]) < BST_OTHER_PATH_SHORT_FWHM * fwhm_px;
+    if (brief && (found->length_px <= BST_OTHER_PATH_LONG_SHARE * found->width_px || !own)) {
         return;
     }
     if (!found->streak || (own && is_other(w, i, found, star)) ||

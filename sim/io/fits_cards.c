@@ -179,22 +179,6 @@ bst_status bst_fits_read_cards(bst_ctx *ctx, const char *name, int hdu, const vo
     return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: HDU %d: the header has no END", name, hdu);
 }
 
-bool bst_fits_card_text(const void *header, uint64_t bytes, const char *key, char value[CARD]) {
-    const char *cards = header;
-    for (uint64_t at = 0; bytes - at >= CARD; at += CARD) {
-        char card[CARD + 1] = "";
-        memcpy(card, cards + at, CARD);
-        if (is_key(card, key)) {
-            card_value(card, value);
-            return true;
-        }
-        if (is_key(card, "END")) {
-            break;
-        }
-    }
-    return false;
-}
-
 /* Column of the value of a card HIERARCH with these words before the =; 0: it is another card. */
 static size_t hierarch_value(const char *card, const char *words) {
     const char *at = card + strlen("HIERARCH");
@@ -212,15 +196,22 @@ static size_t hierarch_value(const char *card, const char *words) {
     }
 }
 
-bool bst_fits_card_hierarch(const void *header, uint64_t bytes, const char *words,
-                            char value[CARD]) {
+/* Column of the value of a card with this key; 0: it is another card. */
+static size_t column_of_value(const char *card, const char *key) {
+    if (strlen(key) <= 8 && !strchr(key, ' ')) {
+        return is_key(card, key) ? 10 : 0;
+    }
+    key += strncmp(key, "HIERARCH ", 9) == 0 ? 9 : 0;
+    key += strspn(key, " ");
+    return *key && is_key(card, "HIERARCH") ? hierarch_value(card, key) : 0;
+}
+
+bool bst_fits_card_text(const void *header, uint64_t bytes, const char *key, char value[CARD]) {
     const char *cards = header;
-    words += strncmp(words, "HIERARCH ", 9) == 0 ? 9 : 0;
-    words += strspn(words, " ");
-    for (uint64_t at = 0; bytes - at >= CARD && *words; at += CARD) {
+    for (uint64_t at = 0; bytes - at >= CARD; at += CARD) {
         char card[CARD + 1] = "";
         memcpy(card, cards + at, CARD);
-        size_t column = is_key(card, "HIERARCH") ? hierarch_value(card, words) : 0;
+        size_t column = column_of_value(card, key);
         if (column > 0) {
             value_from(card, column, value);
             return true;

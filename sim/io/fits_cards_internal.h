@@ -28,13 +28,11 @@ typedef struct bst_fits_cards {
 bst_status bst_fits_read_cards(bst_ctx *ctx, const char *name, int hdu, const void *data,
                                uint64_t bytes, bst_fits_cards *out) BST_MUST_CHECK;
 
-/* Value of a header key as text, without quotes and comment; false: no such key. */
+/* Value of a header key as text, without quotes and comment; false: no such key. A key that is
+ * longer than 8 characters or has blanks is that of a card of ESO's HIERARCH convention: the words
+ * before its =, as "ESO DET EXPTIME", with or without HIERARCH. */
 bool bst_fits_card_text(const void *header, uint64_t bytes, const char *key,
                         char value[BST_FITS_CARD]);
-/* Value, as text, of a card of ESO's HIERARCH convention: `words` before the = with blanks between
- * them, as "ESO DET EXPTIME", with or without HIERARCH; false: no such card. */
-bool bst_fits_card_hierarch(const void *header, uint64_t bytes, const char *words,
-                            char value[BST_FITS_CARD]);
 /* Value of a header key as an integer of at most 18 digits; false: no such key or no integer. */
 bool bst_fits_card_int(const void *header, uint64_t bytes, const char *key, int64_t *value);
 

@@ -112,11 +112,8 @@ bool bst_fits_source_text(bst_fits_source *s, const char *keyword,
         return true;
     }
     char card[BST_FITS_CARD];
-    size_t length = strlen(keyword);
-    bool (*find)(const void *, uint64_t, const char *, char *) =
-        length > 8 || strchr(keyword, ' ') ? bst_fits_card_hierarch : bst_fits_card_text;
-    bool found = length > 0 && (find(s->header.text, s->header.bytes, keyword, card) ||
-                                find(s->primary.text, s->primary.bytes, keyword, card));
+    bool found = *keyword && (bst_fits_card_text(s->header.text, s->header.bytes, keyword, card) ||
+                              bst_fits_card_text(s->primary.text, s->primary.bytes, keyword, card));
     if (found) {
         snprintf(value, BST_FITS_SOURCE_TEXT, "%s", card);
     }
